@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_NAMES = 10  # of columns in a sentence
+SUREST = 0.99  # of a probability that is said in percent
 
 
 def first_names(names: Sequence[str]) -> str:
@@ -81,6 +83,13 @@ class Summarised(Shown):
 def significant(value: float | None, digits: int = 4) -> str:
     """``value`` to ``digits`` significant digits; a dash where there is none."""
     return "–" if value is None or value != value else f"{value:.{digits}g}"
+
+
+def sure(probability: float) -> str:
+    """A probability as a person takes it; never a hundred percent."""
+    if not math.isfinite(probability):
+        return "–"
+    return f"over {100 * SUREST:.0f} %" if probability > SUREST else f"{100 * probability:.0f} %"
 
 
 def moment(time_s: float, digits: int = 6) -> str:

@@ -157,7 +157,8 @@ def _why_not(part: Part) -> str:
     effect = part.effect
     if not effect.is_physical:
         return "noise and faults of the data cannot be taken off a single reading"
-    channels = sorted({*effect.needs, *(parameter.channel for parameter in effect.parameters if parameter.channel)})
+    strengths = (parameter for parameter in effect.parameters if parameter.null is not None)
+    channels = sorted({*effect.needs, *(one.channel for one in strengths if one.channel)})
     if channels:
         return f"it follows another channel ({', '.join(channels)}), which one unit's readings do not carry"
     return effect.why_not_undone

@@ -38,7 +38,7 @@ def cause_of(
     evidence = (
         _without_it(name),
         *_held_out_evidence(member.size, won, thresholds.material),
-        *_against(rivals),
+        *_against(rivals, name.equivalents),
         *_how_sure(name, found, thresholds),
         *_missed_by(law, name, thresholds),
         *_not_shown(name, excitation),
@@ -69,14 +69,15 @@ def _without_it(name: Name) -> Statement:
     )
 
 
-def _against(rivals: Sequence[Rival]) -> list[Statement]:
+def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[Statement]:
     if not rivals:
         return []
     nearest = rivals[0]
     measure = "-2 log likelihood, by its fit" if nearest.by == "fit" else "-2 log evidence"
     way = "less likely" if nearest.margin > 0.0 else "likelier"
     how = f"{way} by {abs(nearest.margin):,.0f} of {measure}" if abs(nearest.margin) >= 0.5 else "as likely"
-    says = f"{in_words(nearest.effect)}, the nearest other, is {how}"
+    beside = " beside what cannot be ruled out" if equivalents and nearest.effect not in equivalents else ""
+    says = f"{in_words(nearest.effect)}, the nearest other{beside}, is {how}"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 
@@ -93,8 +94,8 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
         return [Statement(OF_A_DOUBTED_CAUSE, name.kind_probability, thresholds.least_confidence, says)]
     if name.kind_only:
         says = (
-            "the kind is sure, the law is not: no equation of it fits better than others, and it may be of a kind that"
-            " the catalogue does not have"
+            "what it does to the reading is sure, by which law it does so is not: no equation of its kind fits better"
+            " than others, and it may be an effect that the catalogue does not have"
         )
         return [Statement(OF_A_KIND, name.kind_probability, thresholds.least_confidence, says)]
     return []
@@ -145,10 +146,11 @@ def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statemen
     ]
 
 
-def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds) -> Cause:
-    """An offset or tare: removed, every reading is off by it."""
+def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds, is_of_all: bool = True) -> Cause:
+    """An offset or tare: removed, every reading is off by it, if it ``is_of_all`` recordings."""
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
-    won = gain(worse, best, scale, thresholds)
+    nothing = Errors(best.squares[:0], best.counts[:0], math.nan)
+    won = gain(worse if is_of_all else nothing, best, scale, thresholds)
     parameter = zero.effect.parameters[0]
     factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
     interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd

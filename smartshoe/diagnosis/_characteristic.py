@@ -84,8 +84,8 @@ def _friction(found: Branches) -> str:
     sensor = found.recording.sensor
     half = 0.5 * float(np.median(found.ups - found.downs))
     return (
-        f"the {sensor.name} does not follow this load but its direction: while the load rises it lies"
-        f" {abs(half):.3g} {sensor.unit.symbol} {'above' if half > 0 else 'below'} its mean, while the load falls as"
+        f"the {sensor.name} of {found.recording.name} does not follow this load but its direction: while the load rises"
+        f" it lies {abs(half):.3g} {sensor.unit.symbol} {'above' if half > 0 else 'below'} its mean, while it falls as"
         " much to the other side, which is friction; Coulomb's and viscous friction are told apart by strokes at"
         " several rates only"
     )

@@ -93,8 +93,8 @@ def force_of(found: Compensation, thresholds: Thresholds) -> list[str]:
     if found.error.held_out_n > (1.0 + thresholds.standing) * found.before.held_out_n:
         said.append(
             "the force that the extended model gives back is worse than the baseline's on held-out data"
-            f" ({found.before.held_out_n:.3g} to {found.error.held_out_n:.3g} N), since undoing its effects amplifies"
-            " what is left: compensate by the baseline"
+            f" ({found.before.held_out_n:.3g} to {found.error.held_out_n:.3g} N): compensate by the baseline, as"
+            " identify calibrates it"
         )
     return said
 

@@ -18,7 +18,7 @@ from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import apart
-from smartshoe.diagnosis._zero import Zero
+from smartshoe.diagnosis._zero import OwnZeros, Zero
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
@@ -177,7 +177,10 @@ def worse_of(won: Gain, beyond: str | None) -> str:
 
 def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
     """What is said where recordings that were not fitted are ``off`` by far more than those that were."""
-    why = beyond or "their loads are like the fitted ones: another unit, or a unit that was changed?"
+    why = beyond or (
+        "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
+        " changed, or the model follows the fitted ones for a wrong reason"
+    )
     return f"held-out recordings are off by {100 * off:.2g} % of full scale, fitted ones by {100 * within:.2g} %: {why}"
 
 
@@ -215,7 +218,7 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
     """What is said of recordings of which each has a gain of its own, or several."""
     if not gains:
         return []
-    told = "the causes were found with this allowed for, and no model foresees the gain of another recording"
+    told = "all else is told with this allowed for, and no model foresees the gain of another recording"
     if changes := changes_of(gains):
         return [f"the gain changes {_when(changes)}, as where a unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
@@ -223,6 +226,25 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
         f"each recording has a gain of its own, from {100 * low.share:+.2g} % in {low.recording} to"
         f" {100 * high.share:+.2g} % in {high.recording} beside that of all, as where a unit is taken out and put back:"
         f" {told} (leave the unit in place, or calibrate it each time)"
+    ]
+
+
+def own_zeros_of(zeros: OwnZeros | None, model: ExtendedModel, scale: Scale) -> list[str]:
+    """What is said of recordings of which each has a zero of its own."""
+    if zeros is None:
+        return []
+    low, high = (int(of(zeros.offsets)) for of in (np.argmin, np.argmax))
+
+    def told(at: int) -> str:
+        share = float(zeros.offsets[at])
+        of_scale = f"{100 * share:+.2g} % of full scale"
+        return f"{share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
+
+    off_n = float(np.max(np.abs(zeros.offsets - zeros.mean))) / abs(model.gain) * scale.load_n
+    return [
+        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: that is allowed"
+        " for here, but a calibration takes the mean of the fitted ones, so that the force of a recording may be off by"
+        f" {float(f'{off_n:.2g}'):,g} N throughout (zero the load cell and the sensor before each)"
     ]
 
 

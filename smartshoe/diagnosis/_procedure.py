@@ -19,6 +19,7 @@ from smartshoe.diagnosis._limits import (
     elsewhere_of,
     end_of_range_of,
     own_gains_of,
+    own_zeros_of,
     refusals_of,
     wall_ratio_of,
     worse_of,
@@ -47,7 +48,7 @@ from smartshoe.diagnosis._verdict import (
     verdict_of,
 )
 from smartshoe.diagnosis._withheld import Chosen, causes_among
-from smartshoe.diagnosis._zero import Zero, offsets, zeros_of
+from smartshoe.diagnosis._zero import OwnZeros, Zero, offsets, own_zeros, zeros_of
 from smartshoe.integrity import DataFault, Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
@@ -73,14 +74,19 @@ def diagnosed(
     baseline, best = errors(fine, plain), errors(fine, extended)
     named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
-    causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
+    is_told = found.zero_changes or found.own_gains or given.is_no_unit
+    apart = None if is_told else own_zeros(sessions, found.fit.model, thresholds)
+    causes += [zero_cause_of(zero, best, scale, thresholds, apart is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     outcome = _outcome(found, given, left, off, named, causes, won)
     verdict, rest = outcome.verdict, unexplained_of(causes, left.before, left.after)
     of_held_out = left_where_judged(fine, off, thresholds)
+    # No more is noise than is no structure, and than what was fitted holds beside its own: what a model does not
+    # foresee elsewhere is none for that. What is white there is noise in any case.
     structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
-    noise_variance = max(best.rmse**2 - structure**2, 0.0)
+    no_more = min(best.rmse**2 - structure**2, extended.noise**2 - left.within.rms**2)
+    noise_variance = max(best.rmse**2 - of_held_out**2, no_more, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
         fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
@@ -117,7 +123,7 @@ def diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
         ),
-        limits=_limits(found, given, named, extended, force, outcome, left),
+        limits=_limits(found, given, named, extended, force, outcome, left, apart),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
@@ -218,6 +224,7 @@ def _limits(
     force: Compensation,
     outcome: _Outcome,
     left: _LeftOver,
+    apart: OwnZeros | None,
 ) -> tuple[str, ...]:
     """All that limits the diagnosis, in sentences."""
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
@@ -228,10 +235,11 @@ def _limits(
         *([worse_of(won, ways)] if won.is_loss else []),
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_loss else []),
         *force_of(force, thresholds),
-        *not_undone_of(force.model, given.fine[0].conditions.step_s),
+        *not_undone_of(extended if force.is_plain else force.model, given.fine[0].conditions.step_s),
         *named.limits,
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),
+        *own_zeros_of(apart, extended, given.scale),
         *zero_changes_said(found.zero_changes),
         *refusals_of(found),
     )
@@ -248,7 +256,7 @@ def _left_of_what_was_fitted(
 
 def _nearest(found: Inference) -> tuple[Rival, ...]:
     """The few effects that take most off by themselves; flexible blocks are none."""
-    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:SAID])
+    return tuple([Rival(name, fall, "alone") for name, fall in found.screening if name in catalogue()][:SAID])
 
 
 def _zeros(found: Inference, given: Prepared, left: float, noise: GaussMarkov | None) -> list[Zero]:
@@ -268,15 +276,17 @@ def _percent_less(after: float, before: float) -> float:
 def _with_offset(
     model: ExtendedModel, zeros: Sequence[Zero], sessions: Sequence[Session], scale: Scale
 ) -> ExtendedModel:
-    """``model`` with the recordings' mean offset, so that it gives readings as they are logged."""
-    for zero in zeros:  # the chain's end multiplies what is added to the reading before it
-        value = zero.value / model.gain if zero.effect.shifts == "reading" else zero.value
-        model = model.with_part(zero.effect, np.array([value]))
-    if not any(zero.effect.shifts == "reading" for zero in zeros):
-        rest = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
-        if rest != 0.0:
-            model = model.with_part(shift_of("reading"), np.array([rest / model.gain]))
-    return model
+    """``model`` with the recordings' mean offset, so that it gives readings as they are logged.
+
+    Also where one is named: at the rest that shows it the ``model`` may be off by some of what it misses elsewhere.
+    """
+    for zero in zeros:
+        if zero.effect.shifts == "load":
+            model = model.with_part(zero.effect, np.array([zero.value]))
+    offset = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
+    if offset == 0.0:
+        return model
+    return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the chain's end multiplies it
 
 
 def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:

@@ -41,8 +41,13 @@ class ResidualStructure:
 
     @property
     def how(self) -> str:
-        """What the largest part does: it repeats with the load's cycles, or it changes slowly, whatever these do."""
-        return "repeats" if self.repeating.significant and self.repeating.rms >= self.rms else "changes slowly"
+        """What the largest part does: it repeats with the load's cycles, or it changes slowly, whatever these do.
+
+        What has a memory alone, as what swings within a second, does neither.
+        """
+        if self.repeating.significant and self.repeating.rms >= self.rms:
+            return "repeats"
+        return "changes slowly" if self.slow.significant else "is correlated over time"
 
     @property
     def is_noise(self) -> bool:

@@ -10,11 +10,11 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask, require_positive
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.display import Summarised, SummaryTable, panels, significant
+from smartshoe.display import Summarised, SummaryTable, panels, significant, sure
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, described
-from smartshoe.models.effects import Effect, in_words
+from smartshoe.models.effects import Effect, in_words, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
@@ -53,12 +53,16 @@ class Rival:
     """Another effect that came near: ``margin`` is by how much less likely it is, in -2 log.
 
     ``by``: of a law of the same kind in its place, the likelihood of a ``fit``; of another kind, the ``evidence``, in
-    which equations may be inexact. The two are not on one scale.
+    which equations may be inexact. The two are not on one scale. Where no cause is named, what it ``alone`` takes off.
     """
 
     effect: str
     margin: float
-    by: Literal["fit", "evidence"] = "evidence"
+    by: Literal["fit", "evidence", "alone"] = "evidence"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's entry in ``rivals``."""
+        return {"effect": self.effect, "margin": finite_or_none(self.margin), "by": self.by}
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +277,8 @@ class Diagnosis(Summarised):
         rows = [
             [
                 in_words(cause.name),
-                significant(cause.confidence, 2),
+                listed(cause.equivalents, "or") or "–",
+                sure(cause.confidence),
                 significant(100.0 * cause.size, 3),
                 significant(cause.held_out.gain_percent, 3),
             ]
@@ -281,7 +286,7 @@ class Diagnosis(Summarised):
         ]
         return SummaryTable(
             f"{self.verdict.replace('_', ' ')}: {self.says}",
-            ["cause", "confidence", "size % of full scale", "gain on held-out data %"],
+            ["cause", "or it is", "confidence", "size % of full scale", "gain on held-out data %"],
             rows,
             self.limits,
         )
@@ -301,7 +306,7 @@ class Diagnosis(Summarised):
             "held_out": self.gain.to_dict() if self.gain else None,
             "explainable_percent": finite_or_none(self.explainable_percent),
             "explained_percent": finite_or_none(self.explained_percent),
-            "rivals": [{"effect": rival.effect, "margin": finite_or_none(rival.margin)} for rival in self.rivals],
+            "rivals": [rival.to_dict() for rival in self.rivals],
             "next_experiment": self.next_experiment.to_dict() if self.next_experiment else None,
             "limits": list(self.limits),
             "leftover": self.leftover,

@@ -160,8 +160,8 @@ def sentence_of(
         said = f"{good}; what is fitted is explained by {named}"
     elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong
         said = f"{good}, each recording's own zero and gain allowed for; {named} is found in these"
-    elif worse:
-        said = f"{good}; with {named} it is worse there, good to {by_all}"
+    elif worse or best.rmse > baseline.rmse:
+        said = f"{good}; with {named} it is {'worse' if worse else 'no better'} there, good to {by_all}"
     else:
         said = f"{good}, with {named} to {by_all}"
     return said if verdict == "explained" else f"{said}{left}"

@@ -8,13 +8,13 @@ never unloaded, either may make the same offset.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
-from smartshoe.diagnosis._held_out import own_of, past_of
+from smartshoe.diagnosis._held_out import own_of, past_of, residual_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -47,6 +47,31 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
     return np.array(
         [own_of(one, model, one.reading - model.simulate(one.conditions))[0][0] for one in fitted_of(sessions)]
     )
+
+
+@dataclass(frozen=True)
+class OwnZeros:
+    """Offsets (shares of full scale) of the recordings by their ``names``, which differ; ``mean``: of the fitted."""
+
+    names: tuple[str, ...]
+    offsets: Array
+    mean: float
+
+
+def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> OwnZeros | None:
+    """The zeros of all that can be used, None where they are alike but for what the model leaves of any recording.
+
+    What continues another has none: the unit brings along what it has lost or gained in that.
+    """
+    begun = (one for one in sessions if one.usable.any() and "continues" not in one.recording.metadata)
+    there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in begun]
+    if not there:
+        return None
+    each = offsets(there, model)
+    left = max(float(np.sqrt(np.mean(residual_of(one, model)[one.usable] ** 2))) for one in there)
+    if np.ptp(each) <= thresholds.clear * max(thresholds.tolerable, left):
+        return None
+    return OwnZeros(tuple(one.recording.name for one in there), each, float(np.mean(offsets(sessions, model))))
 
 
 def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:

@@ -223,8 +223,12 @@ def test_what_cannot_be_undone_is_passed_over_and_said(name: str, why: str) -> N
 
 
 def test_a_drift_with_the_temperature_is_passed_over_and_said() -> None:
-    filter_ = ExtendedCompensator(BASELINE.with_part(effect("zero_drift"), np.array([1e-5, 1e-3, 60.0, 1.0])), 100.0)
-    assert "temperature" in filter_.not_inverted["zero_drift"]
+    gain = effect("gain_drift")
+    warmed = np.array([1e-3 if one.name == "temperature_coefficient" else value
+                       for one, value in zip(gain.parameters, gain.start(), strict=True)])  # fmt: skip
+    for part in ((effect("zero_drift"), np.array([1e-5, 1e-3, 60.0, 1.0])), (gain, warmed)):
+        filter_ = ExtendedCompensator(BASELINE.with_part(*part), 100.0)
+        assert "another channel (temperature), which" in filter_.not_inverted[part[0].name]
 
 
 @pytest.mark.parametrize("name", sorted(catalogue()))

@@ -210,6 +210,8 @@ def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged(
     rest = "over all recordings 3.4 % repeats and is not explained"
     worse = f"{good}; with delay it is worse there, good to 20 %"
     assert _said("partly_explained", "delay", baseline=AFTER, best=BEFORE, worse=True) == f"{worse}; {rest}"
+    chance = _said("partly_explained", "delay", baseline=AFTER, best=BEFORE)  # by no more than chance
+    assert chance == f"{worse.replace('worse', 'no better')}; {rest}"
     nothing = Errors(np.zeros(0), np.zeros(0), math.nan)
     unknown = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
     explained = f"{unknown}; what is fitted is explained by delay"
@@ -326,7 +328,8 @@ def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monke
     assert rival.says == "orifice leak, the nearest other, is less likely by 7 of -2 log likelihood, by its fit"
     cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 95.0),))  # of another kind there is the evidence alone
     assert cause.rivals == (Rival("delay", 90.0, "evidence"), Rival("orifice_leak", 95.0, "fit"))
-    assert cause.evidence[-1].says == "delay, the nearest other, is less likely by 90 of -2 log evidence"
+    beside = "beside what cannot be ruled out"  # an orifice, by its fit
+    assert cause.evidence[-1].says == f"delay, the nearest other {beside}, is less likely by 90 of -2 log evidence"
 
 
 def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -341,8 +344,8 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.9, STANDARD.least_confidence)
     assert kind.says == (
-        "the kind is sure, the law is not: no equation of it fits better than others, and it may be of a kind that the"
-        " catalogue does not have"
+        "what it does to the reading is sure, by which law it does so is not: no equation of its kind fits better than"
+        " others, and it may be an effect that the catalogue does not have"
     )
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
@@ -394,7 +397,8 @@ def test_no_rival_is_a_block_of_free_form(monkeypatch: pytest.MonkeyPatch) -> No
     near = (SimpleNamespace(effect="flexible_lag", margin=3.0), SimpleNamespace(effect="dead_band", margin=70.0))
     cause = _told(monkeypatch, exposed, laws=(("flexible_leak", 1.0),), alternatives=near)
     assert cause.rivals == (Rival("dead_band", 70.0, "evidence"), Rival("delay", 90.0, "evidence"))
-    assert cause.evidence[-1].says == "dead band, the nearest other, is less likely by 70 of -2 log evidence"
+    beside = "beside what cannot be ruled out"  # an orifice, by its fit
+    assert cause.evidence[-1].says == f"dead band, the nearest other {beside}, is less likely by 70 of -2 log evidence"
 
 
 @pytest.mark.parametrize(
@@ -440,6 +444,13 @@ def test_a_zero_is_a_cause_by_which_every_reading_is_off(
     assert cause.confidence == (STANDARD.least_confidence if alternatives else 1.0 - STANDARD.false_name)
     assert cause.law_confidence == (0.5 if alternatives else 1.0)
     assert (cause.equivalents, cause.size) == (alternatives, 0.03)
+
+
+def test_a_zero_of_some_recordings_gains_nothing_that_is_known_on_others() -> None:
+    zero = Zero(shift_of("load"), -0.02, 0.004, 0.03)
+    cause = zero_cause_of(zero, AFTER, SCALE, STANDARD, is_of_all=False)
+    assert math.isnan(cause.held_out.gain_percent)
+    assert [one.statistic for one in cause.evidence] == ["deviations from nothing", "size in percent of full scale"]
 
 
 def test_goodness_is_in_the_readings_unit() -> None:
@@ -489,7 +500,7 @@ def test_a_model_gives_readings_as_they_are_logged() -> None:
     assert (name, part) == (shift_of("reading").name, pytest.approx([(mean + 3.0 / -140.0) / 1.2]))
     seen = Zero(shift_of("reading"), 0.06, 0.01, 0.06)
     (shifted,) = _with_offset(MODEL, [seen], [session], SCALE).parts
-    assert shifted.values == pytest.approx([0.05])
+    assert shifted.values == pytest.approx(part)
     tare = Zero(shift_of("load"), 0.06, 0.01, 0.06)
     first, second = _with_offset(MODEL, [tare], [session], SCALE).parts
     assert (first.name, first.values) == (shift_of("load").name, pytest.approx([0.06]))

@@ -223,7 +223,10 @@ def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
 def test_what_is_off_elsewhere_is_said_beside_what_was_fitted_and_the_loads_that_it_is_of() -> None:
     off = "held-out recordings are off by 19 % of full scale, fitted ones by 1.5 %"
     assert elsewhere_of(0.19, 0.015, "the held-out loads reach 900 N") == f"{off}: the held-out loads reach 900 N"
-    alike = "their loads are like the fitted ones: another unit, or a unit that was changed?"
+    alike = (
+        "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
+        " changed, or the model follows the fitted ones for a wrong reason"
+    )
     assert elsewhere_of(0.19, 0.015, None) == f"{off}: {alike}"
 
 
@@ -397,7 +400,7 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     (said,) = own_gains_of(gains)
     assert said.startswith(
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
-        " d and 1 more, as where a unit slips: the causes were found with this allowed for, and no model foresees"
+        " d and 1 more, as where a unit slips: all else is told with this allowed for, and no model foresees"
         " the gain of another recording"
     )
 

@@ -72,7 +72,10 @@ def test_json_holds_what_the_contract_names_and_no_number_that_json_has_not() ->
     }  # fmt: skip
     assert (told["extended"]["force_rmse_n"], told["extended"]["variance_explained_percent"]) == (2.0, 0.0)
     assert (told["explainable_percent"], told["explained_percent"]) == (92.0, 90.5)
-    assert told["rivals"] == [{"effect": "zero_drift", "margin": 12.0}, {"effect": "creep", "margin": None}]
+    assert told["rivals"] == [
+        {"effect": "zero_drift", "margin": 12.0, "by": "evidence"},
+        {"effect": "creep", "margin": None, "by": "evidence"},
+    ]
     assert told["next_experiment"] == {
         "separates": ["linear_leak", "orifice_leak"], "protocol": "long_hold", "channel": None, "says": "Hold it.",
         "expected_margin": 5.0,
@@ -125,5 +128,9 @@ def test_a_figure_shows_what_both_models_leave_where_the_reading_counts() -> Non
 
 def test_a_summary_tells_each_cause_in_percent() -> None:
     text = FOUND.summary()
-    for word in ("explained", "A leak.", "linear leak", "0.93", "1.3", "66", "one rate"):
+    for word in ("explained", "A leak.", "linear leak", "93 %", "1.3", "66", "one rate"):
         assert word in text
+    surest = replace(FOUND.causes[0], confidence=0.9954, equivalents=("orifice_leak",))
+    told = replace(FOUND, causes=(surest,)).summary()
+    assert "over 99 %" in told  # as anywhere: what is meant may be another, and nothing is certain
+    assert "orifice leak" in told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import Any
@@ -17,12 +18,14 @@ from smartshoe.diagnosis._force import Compensation, ForceError, compensation, f
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
+from smartshoe.diagnosis._limits import own_zeros_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate
 from smartshoe.diagnosis._validation import extrapolating
+from smartshoe.diagnosis._zero import own_zeros
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
 from smartshoe.recording import Recording
@@ -351,6 +354,8 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
 
     assert (left(repeated, wandering).rms, left(repeated, wandering).how) == (0.003, "repeats")
     assert (left(wandering, repeated).rms, left(wandering, repeated).how) == (0.003, "changes slowly")
+    swings = left(quiet, quiet, _memory(rms=0.003, tau_s=math.inf))  # as a resonance does, within less than a block
+    assert (swings.rms, swings.how) == (0.003, "is correlated over time")
     assert (left(quiet, quiet).rms, left(quiet, quiet).significant) == (0.0, False)
     # Noise with a memory is no structure; what has a memory and is no noise is, though no larger than all there is.
     noise, other = _memory(), _memory(coloured=9.0)
@@ -509,3 +514,31 @@ def test_coloured_noise_is_told_where_no_structure_would_be_taken_for_it(fine: l
     assert "0.4 % of full scale" in first.says
     run = fine[0].recording
     assert (first.start_s, first.stop_s) == (run.time_s[0], pytest.approx(run.time_s[-1]))
+
+
+def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_them() -> None:
+    clean = [recording(seed=seed) for seed in (1, 2)]
+    sensor = clean[1].sensor
+    moved = clean[1].with_channel(sensor.with_values(sensor.values + 0.05 * MODEL.full_scale_reading))
+    sessions, scale = sessions_of(*clean)
+    assert own_zeros(sessions, MODEL, STANDARD) is None
+    assert own_zeros_of(None, MODEL, scale) == []
+    sessions, scale = sessions_of(clean[0], moved)
+    zeros = own_zeros(sessions, MODEL, STANDARD)
+    assert zeros is not None
+    assert np.ptp(zeros.offsets) == pytest.approx(0.05, rel=0.05)
+    assert zeros.mean == pytest.approx(float(np.mean(zeros.offsets)), rel=0.01)
+    bent = MODEL.with_part("dead_band", np.array([0.2, 0.3, 0.0]))
+    assert own_zeros(sessions, bent, STANDARD) is None  # where as much is left it may be the model's error
+    (said,) = own_zeros_of(zeros, MODEL, scale)
+    assert "% of full scale) in triangles_1 to " in said
+    off_n = np.max(np.abs(zeros.offsets - zeros.mean)) / MODEL.gain * scale.load_n
+    assert off_n == pytest.approx(0.025 / MODEL.gain * scale.load_n, rel=0.1)
+    assert f"off by {off_n:.2g} N throughout" in said
+    on = replace(sessions[1], recording=replace(moved, metadata={"continues": "triangles_1"}))
+    assert own_zeros([sessions[0], on], MODEL, STANDARD) is None
+    assert own_zeros([on], MODEL, STANDARD) is None
+    held = replace(sessions[1], held_out=np.ones_like(sessions[1].held_out))
+    judged = own_zeros([sessions[0], held], MODEL, STANDARD)  # what is judged has one too, and makes no mean
+    assert judged is not None
+    assert judged.mean == pytest.approx(judged.offsets[0], rel=0.01)

@@ -303,7 +303,7 @@ def test_what_a_grid_adds_is_left_whatever_the_model() -> None:
     assert verdict_of(causes, _left(left), _left(left), limits, known=1.1 * left) == "explained"
 
 
-def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list[Recording]) -> None:
+def test_the_offset_that_readings_have_stands_in_the_model_named_or_not(runs: list[Recording]) -> None:
     """So that it reads as was logged; once, whatever the gain at the chain's end."""
     usable = [run.sensor.present for run in runs]
     scale = full_scale(runs, usable, Thresholds())
@@ -314,8 +314,8 @@ def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list
     assert part.name == "zero_offset"
     assert part.values[0] * model.gain == pytest.approx(float(np.mean(offsets(sessions, model))))
     named = Zero(shift_of("reading"), 0.05, 0.001, 0.05)
-    (only,) = _with_offset(model, (named,), sessions, scale).parts
-    assert only.values[0] * model.gain == pytest.approx(0.05)
+    (only,) = _with_offset(model, (named,), sessions, scale).parts  # at rest there may be more of it than under load
+    assert only.values[0] * model.gain == pytest.approx(float(np.mean(offsets(sessions, model))))
     tared = Zero(shift_of("load"), -0.02, 0.001, 0.02)
     both = {part.name: float(part.values[0]) for part in _with_offset(model, (tared,), sessions, scale).parts}
     assert both["load_cell_tare"] == -0.02

@@ -106,6 +106,19 @@ def test_ticks_of_a_logarithm_are_several_and_apart(
     assert np.diff(sorted(places.values())).min() > 40.0
 
 
+@pytest.mark.parametrize("most", [0.02, 0.045, 0.099])
+def test_a_low_panel_about_zero_has_more_than_the_zero_on_its_axis(
+    tabulated: Drawn, browser: Browser, most: float
+) -> None:
+    x = 1000.0 + np.arange(60.0)
+    line = Line("a", 0.9 * most * np.sin(x), "raw")
+    tabulated(
+        _chart(x, [Panel("y (V)", [line], (-most, most), height=130), Panel("z (V)", [line], (-most, most), 130)])
+    )
+    written = {text for text, _ in browser.run("written")}
+    assert {text for text in written if text.startswith("−0.0")}
+
+
 def test_a_band_is_not_drawn_where_there_is_nothing(tabulated: Drawn, browser: Browser) -> None:
     x = np.arange(60.0)
     values = np.where((x > 20) & (x < 40), np.nan, 0.0)

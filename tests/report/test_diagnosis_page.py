@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from balance import Balance
 from browser import Browser
-from diagnoses_made import CASES, FULL_READING, LEAK, LEAK_CAUSE, NAME, RUN_NEXT, case, page, plain_text
+from diagnoses_made import BASELINE, CASES, FULL_READING, LEAK, LEAK_CAUSE, NAME, RUN_NEXT, case, page, plain_text
 from looks import look, unfold
 
 from smartshoe.diagnosis import Trace
@@ -183,16 +184,39 @@ def test_why_a_cause_is_not_sure_is_said_where_it_is_named(
     statistic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Once, and not among what is folded."""
-    why = "the kind is sure, the law is not"
+    why = "by which law it does so is not"
     doubted = replace(LEAK_CAUSE, evidence=(*LEAK_CAUSE.evidence, Statement(statistic, 0.9, 0.75, why)))
     assert (LEAK_CAUSE.doubt, doubted.doubt) == ("", why)
     made = replace(case("one cause"), causes=(doubted,))
     text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
-    assert text.count("The kind is sure, the law is not.") == 1
-    assert text.index("The kind is sure") < text.index("What speaks for it")
+    assert text.count("By which law it does so is not.") == 1
+    assert text.index("By which law it does so") < text.index("What speaks for it")
     monkeypatch.setenv("COLUMNS", "240")
     print_diagnosis(made)
     assert f"; {why}" in capsys.readouterr().out
+
+
+def test_a_reading_that_falls_with_the_load_is_said_to_before_its_causes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = case("one cause")
+    for full_scale, count in ((70.0, 0), (-70.0, 1)):
+        model = replace(BASELINE, full_scale_reading=full_scale)
+        page_of = write_diagnosis_page(tmp_path / "x.html", replace(made, model=model), "t", {})
+        print_diagnosis(replace(made, model=model))
+        for text in (plain_text(page_of.read_text(encoding="utf-8")), capsys.readouterr().out):
+            assert text.count("The reading falls as the load rises") == count
+
+
+def test_a_page_without_a_test_of_the_noise_draws_no_share_of_it(tmp_path: Path) -> None:
+    made = case("one cause")
+    assert made.extended is not None
+    untold = replace(made, extended=replace(made.extended, structure_rms=math.nan))
+    for one, count in ((made, 1), (untold, 0)):
+        html = write_diagnosis_page(tmp_path / "x.html", one, "t", {}).read_text(encoding="utf-8")
+        assert html.count('<div class="parts"') == count
+        assert ("of what could be explained is explained" in html) == bool(count)
+    assert "how much of the rest is noise cannot be told" in html
 
 
 def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
@@ -225,12 +249,12 @@ def test_nothing_is_named_where_nothing_was_found() -> None:
     for name in ("adequate", "unexplained"):
         text = plain_text(page(name))
         assert " sure" not in text[: text.index("Every number that decides")]  # of which some say when a name is sure
-        assert "Nothing that matters was added." in text
+        assert "Nothing was added." in text
         assert "No cause is named" in text
         assert "Nearest candidates, by what each alone takes off −2 log likelihood: zero drift (88.0)." in text
     why = "No cause may be named; the limits at the end of this page say why where the data is the reason."
     assert why in plain_text(page("unexplained"))
-    matters = "No effect moves the reading by enough to matter, so none is named."
+    matters = "no more than small imperfections of a good unit, or faults of the data, add up to"
     assert matters in plain_text(page("adequate"))
 
 

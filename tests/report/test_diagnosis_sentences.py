@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from smartshoe.diagnosis import Gain
 from smartshoe.diagnosis._result import Rival
+from smartshoe.display import sure
 from smartshoe.models.effects import effect, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
@@ -21,15 +22,17 @@ from smartshoe.report.diagnosis._sentences import (
     Row,
     comparison,
     gain_sentence,
+    gain_text,
     heading,
     interval,
+    nothing_left,
     parameter_text,
     percent_of_whole,
     shares,
     shares_text,
-    sure,
     two_numbers,
     unnamed,
+    what_was_gained,
     why_this_one,
 )
 
@@ -118,7 +121,10 @@ def test_an_interval_keeps_value_and_bounds_to_a_tenth_of_its_half_width(value: 
 
 
 def test_a_gain_that_is_none_is_not_called_one() -> None:
-    assert "it does not fall: −0.84 % [−2.2, 0.41]" in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
+    assert "it rises by 0.84 % [−0.41, 2.2]." in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
+    unknown = Gain(math.nan, math.nan, "mbar", math.nan, (math.nan, math.nan))
+    assert gain_sentence(unknown) == "What it gains on data that was not fitted is not known."
+    assert gain_text(unknown) == "–"
     assert parameter_text(Parameter(0.0, 0.0, (0.0, 0.0), "1/K")) == "held at 0 1/K"
 
 
@@ -161,3 +167,48 @@ def test_words_for_numbers() -> None:
 def test_not_all_is_not_said_to_be_all() -> None:
     """In large letters too, where 99.6 % was rounded to 100."""
     assert [percent_of_whole(one) for one in (100.0, 99.6, 99.0, 12.4)] == ["100 %", "over 99 %", "99 %", "12 %"]
+
+
+def test_where_no_test_tells_structure_from_noise_no_share_is_called_noise() -> None:
+    made = case("one cause")
+    assert made.extended is not None
+    untold = replace(made, extended=replace(made.extended, structure_rms=math.nan), explained_percent=85.0)
+    assert shares(untold) is None
+    said = "Of the error's variance 85 % is explained; how much of the rest is noise cannot be told."
+    assert shares_text(untold) == said
+    assert shares_text(replace(untold, explained_percent=0.2)) == said.replace("85 %", "none")
+    assert nothing_left(untold) == "There is too little data to tell structure from noise in what is left."
+
+
+def test_structure_that_is_left_is_said_where_the_table_beside_it_has_it() -> None:
+    made = case("one cause")
+    assert made.extended is not None
+    none = "Taken over the whole record, no structure that matters stands out of the noise."
+    for rms, said in (
+        (0.0, none),
+        (0.0001, none),
+        (0.0015, "(0.15 % of full scale, rms) is left over the whole record"),
+    ):
+        left = replace(made, extended=replace(made.extended, structure_rms=rms * made.full_scale_reading))
+        assert said in nothing_left(left)
+
+
+def test_what_was_gained_is_lower_higher_or_the_same() -> None:
+    made = case("one cause")
+    assert made.gain is not None
+    added = "Added: linear leak."
+    lower = re.fullmatch(
+        rf"{added} It lowers the error on data that was not fitted by [\d.]+ % .*", what_was_gained(made)
+    )
+    assert lower
+    worse = replace(made, gain=Gain(0.35, 0.43, "mbar", -22.0, (-41.0, 3.0)), minor=("delay", "sensor_lag"))
+    assert what_was_gained(worse) == (
+        "Added: linear leak; without a name: delay and sensor lag. Together they raise the error on data that was not"
+        " fitted by 22.0 % (95 % interval −3.00 to 41.0 %)."
+    )
+    same = replace(made, extended=made.baseline)
+    assert what_was_gained(same).endswith("so that the error stays as it is.")
+    assert what_was_gained(replace(made, gain=None)) == added
+    nameless = replace(made, causes=(), minor=("delay",))
+    assert what_was_gained(nameless).startswith("Added: without a name: delay. It lowers")
+    assert what_was_gained(replace(nameless, minor=())) == "Nothing was added."

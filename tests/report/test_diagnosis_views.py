@@ -17,7 +17,7 @@ from smartshoe.protocol import Protocol
 from smartshoe.report.diagnosis._charts import faults
 from smartshoe.report.diagnosis._protocol_file import protocol_text
 from smartshoe.report.diagnosis.grids import ranked
-from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_at_two_rates, worst_cycle
+from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_at_two_rates, spectrum, worst_cycle
 
 
 def test_a_block_that_stands_for_a_cause_was_chosen() -> None:
@@ -65,6 +65,21 @@ def test_bins_keep_the_mean_and_the_spread() -> None:
     found = binned(x, 2.0 * x + noise, edges_of(x, 20))
     np.testing.assert_allclose(found.mean, 2.0 * found.x, atol=5 * 0.1 / math.sqrt(500))
     np.testing.assert_allclose(found.sd, math.hypot(0.1, 2 * 0.05 / math.sqrt(12)), rtol=0.2)
+
+
+def test_a_tone_stands_at_its_frequency_whatever_rates_recordings_have() -> None:
+    first, second = traces_of((), ())
+    columns = ("time_s", "load_n", "reading", "baseline", "extended", "usable", "held_out", "cycle")
+    every = {name: getattr(second, name)[::5] for name in columns}
+    for traces in ((first, second), (first, replace(second, **every)), (replace(second, **every), first)):
+        found = evidence(traces, FULL_LOAD_N)
+        assert found is not None
+        own = np.concatenate([one.time_s - one.time_s[0] for one in traces])
+        tone = np.sin(2.0 * np.pi * 2.0 * own)
+        frequency, density = spectrum(found, tone + 1e-3 * np.random.default_rng(1).standard_normal(own.size))
+        loud = density > 0.1 * density.max()
+        assert frequency[loud] == pytest.approx(2.0, rel=0.1)
+        assert frequency.max() == pytest.approx(25.0, rel=0.1)  # as far as the faster one's goes
 
 
 def test_residuals_run_on_from_recording_to_recording() -> None:

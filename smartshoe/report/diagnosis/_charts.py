@@ -82,7 +82,8 @@ def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
         return None
     trace = segment.trace
     usable = trace.usable[segment.span]
-    lines = [Line("before", np.where(usable, (trace.reading - trace.baseline)[segment.span], np.nan), BEFORE)]
+    label = "before" if differs(trace) else "error"
+    lines = [Line(label, np.where(usable, (trace.reading - trace.baseline)[segment.span], np.nan), BEFORE)]
     if differs(trace):
         lines.append(Line("after", np.where(usable, (trace.reading - trace.extended)[segment.span], np.nan), AFTER))
     held = "not fitted" if trace.held_out[segment.span].mean() > 0.5 else "fitted"

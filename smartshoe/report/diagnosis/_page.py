@@ -54,9 +54,13 @@ def write_diagnosis_page(
         "headline": sentences.how_much(diagnosis),
         "said": said,
         "numbers": _numbers(diagnosis),
+        "gained": sentences.what_was_gained(diagnosis),
+        "nothing_left": sentences.nothing_left(diagnosis),
         "comparison": sentences.comparison(diagnosis),
         "shares": sentences.shares_text(diagnosis),
         "parts": _parts(diagnosis),
+        "turned_over": sentences.turned_over(diagnosis),
+        "intervals": sentences.INTERVALS,
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
         "minor": sentences.unnamed(diagnosis),
         "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
@@ -101,9 +105,9 @@ def _value(value: Any) -> str:
 
 def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     """The baseline's error variance: what each part is called, its colour, its percent."""
-    if diagnosis.baseline is None:
+    part = None if diagnosis.baseline is None else sentences.shares(diagnosis)
+    if part is None:
         return []
-    part = sentences.shares(diagnosis)
     return [
         ("explained", "corrected", part.explained),
         ("could be explained, and is left", "raw", part.left),
@@ -116,28 +120,30 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     before, after = diagnosis.baseline, diagnosis.extended
     if before is None or after is None:
         return []
+    is_of_recordings = sentences.is_of_recordings(diagnosis)
+    part = None if is_of_recordings else sentences.shares(diagnosis)
     said = [
         (
             f"{plain(sentences.share_of_full_scale(diagnosis, before.rmse), 2)} %",
             "of full scale: error of the simulation",
         )
     ]
-    if diagnosis.causes:
+    if diagnosis.causes and not is_of_recordings:
         said.append(
             (
                 f"{plain(sentences.share_of_full_scale(diagnosis, after.rmse), 2)} %",
                 "of full scale: error of the extended model",
             )
         )
-        part = sentences.shares(diagnosis)
+    if part is not None and diagnosis.causes:
         said.append(
             (
                 sentences.percent_of_whole(100 * part.explained / max(part.explained + part.left, 1e-9)),
                 "of what could be explained is explained",
             )
         )
-    else:
-        said.append((f"{plain(sentences.shares(diagnosis).noise, 3)} %", "of the error's variance is noise"))
+    elif part is not None:
+        said.append((f"{plain(part.noise, 3)} %", "of the error's variance is noise"))
     count = len(diagnosis.causes)
     said.append((str(count), "cause named" if count == 1 else "causes named"))
     return said

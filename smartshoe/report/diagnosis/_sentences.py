@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
+from smartshoe.display import sure
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import catalogue, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
@@ -25,7 +26,9 @@ HEADINGS = {
 }
 NOT_SURE = "The simulation is wrong, and it is known what follows it, though not each cause is sure"
 OF_THEIR_OWN = "The simulation is good enough, and what recordings have of their own is found"
-SUREST = 0.99
+INTERVALS = (
+    "A parameter's interval is of the noise alone: where its equation is not exact the value may be off by more."
+)
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
 
 
@@ -36,18 +39,16 @@ def heading(diagnosis: Diagnosis) -> str:
     """
     if diagnosis.verdict != "explained":
         return HEADINGS[diagnosis.verdict]
-    before, after = diagnosis.baseline, diagnosis.extended
-    if before and after and before.rmse == after.rmse:
+    if is_of_recordings(diagnosis):
         return OF_THEIR_OWN
     is_sure = all(cause.confidence >= diagnosis.thresholds.least_confidence for cause in diagnosis.causes)
     return HEADINGS["explained"] if is_sure else NOT_SURE
 
 
-def sure(confidence: float) -> str:
-    """A probability as a person takes it; never a hundred percent."""
-    if not math.isfinite(confidence):
-        return "–"
-    return f"over {100 * SUREST:.0f} %" if confidence > SUREST else f"{100 * confidence:.0f} %"
+def is_of_recordings(diagnosis: Diagnosis) -> bool:
+    """Whether all that is named is of recordings, as a zero is, for which the plain model allows."""
+    before, after = diagnosis.baseline, diagnosis.extended
+    return bool(diagnosis.causes and before and after and before.rmse == after.rmse)
 
 
 def how_sure(cause: Cause) -> str:
@@ -120,19 +121,29 @@ def parameter_text(parameter: Parameter) -> str:
 
 
 def gain_text(gain: Gain) -> str:
-    """By how many percent the error falls, with its interval."""
-    low, high = gain.ci95
+    """By how many percent the error falls, with its interval; below zero it rises."""
+    return _percent_text(gain.gain_percent, *gain.ci95)
+
+
+def _percent_text(percent: float, low: float, high: float) -> str:
+    if not math.isfinite(percent):
+        return "–"
     span = f" [{plain(low, 2)}, {plain(high, 2)}]" if high > low else ""
-    return f"{plain(gain.gain_percent, 2)} %{span}".replace("-", "−")
+    return f"{plain(percent, 2)} %{span}".replace("-", "−")
 
 
 def gain_sentence(gain: Gain) -> str:
     """The error without and with something, on data that was not fitted."""
+    if not math.isfinite(gain.gain_percent):
+        return "What it gains on data that was not fitted is not known."
     without, within = two_numbers(gain.rmse_before, gain.rmse_after)
-    outcome = "falls by" if gain.gain_percent > 0 else "does not fall:"
+    low, high = gain.ci95
+    outcome = f"falls by {gain_text(gain)}"
+    if gain.gain_percent < 0:
+        outcome = f"rises by {_percent_text(-gain.gain_percent, -high, -low)}"
     return (
         f"On data that was not fitted, the error is {without} {gain.unit} without it and {within} {gain.unit} with it:"
-        f" it {outcome} {gain_text(gain)}."
+        f" it {outcome}."
     )
 
 
@@ -175,14 +186,11 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
     if before is None or after is None:
         return []
 
-    def of_scale(standing: GoodnessOfFit, value: float) -> str:
-        return f"{plain(value)} {standing.unit} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
-
     rows = [
         Row(
             "error of the simulated reading, rms (of full scale)",
-            of_scale(before, before.rmse),
-            of_scale(after, after.rmse),
+            _of_scale(diagnosis, before, before.rmse),
+            _of_scale(diagnosis, after, after.rmse),
             _change(before.rmse, after.rmse),
         ),
         Row("fit, 100 % for no error", f"{before.fit_percent:.2f} %", f"{after.fit_percent:.2f} %", ""),
@@ -203,7 +211,8 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
     def structure(standing: GoodnessOfFit) -> str:
         if not math.isfinite(standing.structure_rms):
             return NOT_TESTED
-        return of_scale(standing, standing.structure_rms) if standing.structure_rms > 0 else NO_STRUCTURE
+        found = standing.structure_rms
+        return _of_scale(diagnosis, standing, found) if found > 0 else NO_STRUCTURE
 
     rows.append(
         Row(
@@ -216,11 +225,52 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
     return rows
 
 
+def what_was_gained(diagnosis: Diagnosis) -> str:
+    """What was added to the baseline, and by how much the error on held-out data is lower, or higher, for it."""
+    names, others = [in_words(cause.name) for cause in diagnosis.causes], unnamed(diagnosis)
+    if not (names or others):
+        return "Nothing was added."
+    without = [f"without a name: {others}"] if others else []
+    added = f"Added: {'; '.join([', '.join(names), *without] if names else without)}."
+    if is_of_recordings(diagnosis):
+        return (
+            f"{added} The plain model allows for what recordings have of their own, so that the error stays as it is."
+        )
+    won = diagnosis.gain
+    if won is None or not math.isfinite(won.gain_percent):
+        return added
+    together = "Together they" if len(names) + len(diagnosis.minor) > 1 else "It"
+    rises = won.gain_percent < 0
+    way = ("raise" if rises else "lower") + ("" if together.endswith("they") else "s")
+    low, high = (-won.ci95[1], -won.ci95[0]) if rises else won.ci95
+    span = f"{plain(low)} to {plain(high)} %".replace("-", "−")
+    return (
+        f"{added} {together} {way} the error on data that was not fitted by {plain(abs(won.gain_percent))} %"
+        f" (95 % interval {span})."
+    )
+
+
+def _of_scale(diagnosis: Diagnosis, standing: GoodnessOfFit, value: float) -> str:
+    """A figure of ``standing`` in the reading's unit, and of full scale."""
+    return f"{plain(value)} {standing.unit} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
+
+
 def _change(before: float, after: float) -> str:
     if not before > 0 or not math.isfinite(after):
         return "–"
     percent = 100.0 * (after / before - 1.0)
     return "none" if abs(percent) < 0.5 else f"{percent:+.0f} %".replace("-", "−")
+
+
+def turned_over(diagnosis: Diagnosis) -> str:
+    """What is said before causes of a reading that falls as the load rises; empty of any other."""
+    model = diagnosis.model
+    if model is None or model.full_scale_reading * model.gain > 0.0:
+        return ""
+    return (
+        "The reading falls as the load rises, and causes are described for one that rises: read lower for higher, and"
+        " falls for rises."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,8 +335,13 @@ class Shares:
     noise: float
 
 
-def shares(diagnosis: Diagnosis) -> Shares:
-    """How the baseline's error divides into what was explained, what could be, and what is noise; the sum is 100."""
+def shares(diagnosis: Diagnosis) -> Shares | None:
+    """How the baseline's error divides into what was explained, what could be, and what is noise; the sum is 100.
+
+    None where no test could have told structure from noise.
+    """
+    if diagnosis.extended is not None and not math.isfinite(diagnosis.extended.structure_rms):
+        return None
     explained = min(max(diagnosis.explained_percent, 0.0), 100.0)
     explainable = min(max(diagnosis.explainable_percent, explained), 100.0)
     return Shares(explained, explainable - explained, 100.0 - explainable)
@@ -300,6 +355,9 @@ def percent_of_whole(percent: float) -> str:
 def shares_text(diagnosis: Diagnosis) -> str:
     """The same in a sentence."""
     part = shares(diagnosis)
+    if part is None:
+        said = percent_of_whole(diagnosis.explained_percent) if diagnosis.explained_percent >= 0.5 else "none"
+        return f"Of the error's variance {said} is explained; how much of the rest is noise cannot be told."
     explainable = part.explained + part.left
     if explainable < 0.5:
         return "Nearly all of the error's variance is noise, which no model explains."
@@ -307,6 +365,21 @@ def shares_text(diagnosis: Diagnosis) -> str:
     explained = 100.0 * part.explained / explainable
     of_it = percent_of_whole(explained) if explained >= 0.5 else "none"
     return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it} is explained."
+
+
+def nothing_left(diagnosis: Diagnosis) -> str:
+    """What is said of the structure that is left where the verdict asks no more of it: none, or how much it is."""
+    after = diagnosis.extended
+    if after is None or not math.isfinite(after.structure_rms):
+        return "There is too little data to tell structure from noise in what is left."
+    of_scale = share_of_full_scale(diagnosis, after.structure_rms)
+    if of_scale <= 100.0 * diagnosis.thresholds.material:
+        return "Taken over the whole record, no structure that matters stands out of the noise."
+    return (
+        f"Beside noise {plain(after.structure_rms)} {after.unit} ({plain(of_scale, 2)} % of full scale, rms) is left"
+        " over the whole record: no more than small imperfections of a good unit, faults of the data, or equations that"
+        " are not exact, account for."
+    )
 
 
 def fault_text(fault: DataFault) -> str:

@@ -10,8 +10,10 @@ from rich.table import Table
 
 from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.design import Design
+from smartshoe.display import sure
 from smartshoe.models.effects import in_words, listed
 from smartshoe.report.diagnosis._sentences import (
+    INTERVALS,
     comparison,
     fault_text,
     for_this_one,
@@ -21,7 +23,7 @@ from smartshoe.report.diagnosis._sentences import (
     is_free_form,
     parameter_text,
     shares_text,
-    sure,
+    turned_over,
     unnamed,
     why_this_one,
 )
@@ -101,8 +103,10 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
             table.add_row(in_words(cause.name) if k == 0 else "", name, value, *of_cause)
     console.print()
     console.print(table)
-    for cause in diagnosis.causes:
-        _line(console, _about(cause))
+    _line(console, INTERVALS)
+    for text in (turned_over(diagnosis), *map(_about, diagnosis.causes)):
+        if text:
+            _line(console, text)
 
 
 def _wrapping(title: str, columns: Sequence[str]) -> Table:

@@ -282,19 +282,26 @@ def _merged(rates: Sequence[float], alike: float = 0.25, most: int = 6) -> list[
 def spectrum(found: EvidenceView, residual: Array) -> tuple[Array, Array]:
     """Frequency (m,) in Hz and amplitude spectral density (m,) of the residual, evened out over log frequency.
 
-    Frequencies at which there is nothing are left out.
+    Each recording counts by its duration, as far as its own rate goes. Frequencies at which there is nothing are left
+    out.
     """
     from scipy.signal import welch  # a diagnosis has it imported already; a page's start-up need not
 
-    gaps = np.diff(found.time_s)
-    step_s = float(np.median(gaps[gaps > 0])) if np.any(gaps > 0) else 1.0
-    length = int(min(residual.size, max(256, 2 ** int(np.log2(max(residual.size / 4, 2))))))
-    frequency, power = welch(residual - residual.mean(), 1.0 / step_s, nperseg=length, detrend=False)
-    frequency, power = np.asarray(frequency)[1:], np.asarray(power)[1:]
+    edges = np.searchsorted(found.time_s, found.starts[1:])
+    columns: list[Array] = []
+    for time_s, own in zip(np.split(found.time_s, edges), np.split(residual, edges), strict=True):
+        gaps = np.diff(time_s)
+        if not np.any(gaps > 0):
+            continue
+        step_s = float(np.median(gaps[gaps > 0]))
+        length = int(min(own.size, max(256, 2 ** int(np.log2(max(own.size / 4, 2))))))
+        frequency, power = welch(own - own.mean(), 1.0 / step_s, nperseg=length, detrend=False)
+        columns.append(np.array([frequency[1:], power[1:], np.full(frequency.size - 1, own.size * step_s)]))
+    frequency, power, weight = np.concatenate([np.zeros((3, 0)), *columns], axis=1)
     if frequency.size == 0:
         return frequency, power
-    place = np.floor(24 * np.log10(frequency / frequency[0])).astype(np.intp)
-    count = np.bincount(place)
-    filled = (count > 0) & (np.bincount(place, power) > 0)
-    mean = np.bincount(place, power)[filled] / count[filled]
-    return np.bincount(place, frequency)[filled] / count[filled], np.sqrt(mean)
+    place = np.floor(24 * np.log10(frequency / frequency.min())).astype(np.intp)
+    total = np.bincount(place, power * weight)
+    filled = total > 0
+    count = np.bincount(place, weight)[filled]
+    return np.bincount(place, frequency * weight)[filled] / count, np.sqrt(total[filled] / count)

@@ -127,7 +127,9 @@
         made.splits = (u) => (chart.data.x.length <= 12 ? chart.data.x : logTicks(u.scales.x.min, u.scales.x.max, u.bbox.width / devicePixelRatio));
         made.filter = (u, splits) => splits;
       }
-    } else made.size = wide;
+    } else {
+      made.size = wide; made.space = 20;  // a low panel about zero needs a number beside it
+    }
     if (!made.values) made.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(chart.logX && isX ? 3 : 6)).replace("-", "−")));
     return made;
   }
