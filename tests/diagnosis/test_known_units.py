@@ -194,7 +194,7 @@ def test_a_cause_stays_one_as_what_counts_is_raised_to_a_third_of_it(leaking: Hi
     (cause,) = usual.causes
     assert (usual.verdict, cause.effect.family) == ("explained", "leak")
     assert cause.size == pytest.approx(0.006, rel=0.2)
-    for material in (2e-4, 5e-4, 1e-3, 2e-3):
+    for material in (5e-4, 2e-3):
         found = diagnose(leaking.recordings, hold_out=leaking.hold_out, material=material)
         (again,) = found.causes
         assert (found.verdict, again.name, again.equivalents) == (usual.verdict, cause.name, cause.equivalents)
@@ -286,7 +286,7 @@ def test_a_zero_that_is_led_back_from_high_loads_is_told_and_one_from_no_load_is
     assert not any(one.startswith("led back") for one in found.limits)
 
 
-@pytest.mark.parametrize("seed", [20, 22, 25])
+@pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.bank) for seed in (22, 25))])
 def test_what_a_walk_remembers_from_before_it_was_cut_is_no_offset(seed: int) -> None:
     """As the foot swings, and as it stands: the wall has borne the steps before."""
     case = hide({}, protocol="walking", seed=seed)

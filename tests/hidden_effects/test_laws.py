@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cannot_be_told import PLAIN, leaves
+from daily import first_and_bank
 
 from simulators.hidden._baseline import lagged
 from simulators.hidden._machine import Chain, Departed, Given, balanced, recorded
@@ -212,7 +213,7 @@ def test_the_bank_plans_the_same_for_ever_and_within_its_bounds(kind):
         assert any(set(p.fitted) == {"single_rate"} for p in plans)
 
 
-@pytest.mark.parametrize("index", [816, 900])
+@pytest.mark.parametrize("index", first_and_bank([816, 900], {816}))
 def test_a_departure_stays_within_its_bound_at_the_amount_that_was_found(index):
     """A second arm near the unit's own is mostly absorbed: forty times the usual amount is found, which bends more."""
     for one in case("two", index).hidden:

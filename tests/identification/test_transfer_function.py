@@ -199,7 +199,11 @@ def test_the_three_methods_share_srivcs_optimum_on_rao_garnier():
 
 
 @pytest.mark.parametrize(
-    ("method", "seed"), [("srivc", 1), ("srivc", 2), ("srivc", 3), ("gn", 2), ("lm", 2), ("trf", 2)]
+    ("method", "seed"),
+    [
+        *((method, 2) for method in ("srivc", *PEM)),
+        *(pytest.param("srivc", seed, marks=pytest.mark.bank) for seed in (1, 3)),
+    ],
 )
 def test_a_delay_of_eight_seconds_is_found(method, seed):
     step_s, late = 0.1, 80

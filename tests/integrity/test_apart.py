@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from simulators.hidden.recordings import hide
+from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.integrity import examine
@@ -87,10 +89,15 @@ def _late(recording: Recording, by_s: float) -> Recording:
     return recording.with_channel(sensor.with_values(np.interp(time_s - by_s, time_s, sensor.with_nan())))
 
 
+@cache
+def _sound(protocol: str) -> HiddenCase:
+    return hide({}, protocol=protocol, seed=12, recordings=2)
+
+
 @pytest.mark.parametrize("protocol", ["rates", "walking", "holds", "staircase", "shuffled", "step", "minor_loops"])
 @pytest.mark.parametrize("by_s", [0.0, 0.1, -0.1])
 def test_sound_units_are_told_two_clocks_where_there_are_two(protocol: str, by_s: float) -> None:
-    case = hide({}, protocol=protocol, seed=12, recordings=2)
+    case = _sound(protocol)
     found = examine([case.recordings[0], _late(case.recordings[1], by_s), *case.hold_out], STANDARD)
     assert found.clock_offset_s == pytest.approx((0.0, by_s, 0.0), abs=0.02)
     told = [(fault.kind, fault.recording) for fault in found.faults if fault.kind == "two_clocks"]
@@ -99,7 +106,7 @@ def test_sound_units_are_told_two_clocks_where_there_are_two(protocol: str, by_s
 
 @pytest.mark.parametrize("protocol", ["walking", "staircase"])
 def test_a_sound_unit_of_which_one_recording_is_late_is_as_good_as_another(protocol: str) -> None:
-    case = hide({}, protocol=protocol, seed=12, recordings=2)
+    case = _sound(protocol)
     found = diagnose([_late(case.recordings[0], 0.1), case.recordings[1]], case.hold_out)
     assert (found.verdict, found.causes) == ("adequate", ())
     (said,) = [fault.says for fault in found.data_faults if fault.kind == "two_clocks"]

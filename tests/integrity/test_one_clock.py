@@ -152,7 +152,7 @@ def test_nor_does_one_of_steps_alone_that_is_read_late_by_half_of_one(late_s: fl
 
 
 @pytest.mark.parametrize("late_s", [-2.5, -2.0, 1.6, 2.0, 2.5, 3.0])
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.bank)])
 def test_steps_are_read_as_late_as_they_are_alone_and_beside_others(late_s: float, seed: int) -> None:
     """Late by more than a step: no two steps are alike, so that the reading follows its own far more closely."""
     alone, beside = _walked(late_s, seed, held=False), _ramps(late_s)
