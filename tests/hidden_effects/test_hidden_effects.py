@@ -145,7 +145,7 @@ def require_names_parameters_and_gains(asked_cases: list[Asked], most_off: int, 
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_an_effect_of_every_family_is_named_with_its_parameters_and_a_gain(group):
+def test_an_effect_of_each_family_not_asked_for_elsewhere_is_named_with_its_parameters_and_a_gain(group):
     strongest = strongest_of_each_family()
     assert {EFFECTS[case.name].family for case in strongest} == {EFFECTS[name].family for name in INSIDE}
     daily = [case for case in strongest if EFFECTS[case.name].family not in ASKED_FOR_ELSEWHERE]
