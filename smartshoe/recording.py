@@ -245,8 +245,10 @@ class Recording(Summarised):
 
     @property
     def sample_rate_hz(self) -> float:
-        """One over the median step."""
-        return 1.0 / self.sample_time_s
+        """Samples a second while none is missing: `sample_rate_of` its time."""
+        if len(self) < 2:
+            raise InputError(f"{self.label} holds one sample: a rate needs two at least")
+        return sample_rate_of(self.time_s)
 
     @property
     def is_uniform(self) -> bool:
@@ -382,6 +384,16 @@ def column_name(channel: Channel) -> str:
     return f"{channel.name}_{channel.unit.suffix}"
 
 
+def sample_rate_of(time_s: Array) -> float:
+    """Samples a second while none is missing, in Hz, of time stamps (n,), two at least.
+
+    By the mean step, since stamps may be rounded: to milliseconds those of 90 Hz are 11 ms apart more often than not.
+    Steps that are nearly two of the median's, or more, are gaps.
+    """
+    steps = np.diff(time_s)
+    return float(1.0 / np.mean(steps[steps < 1.75 * np.median(steps)]))
+
+
 __all__ = [
     "REGIONS",
     "SECOND",
@@ -391,5 +403,6 @@ __all__ = [
     "Role",
     "column_name",
     "declared",
+    "sample_rate_of",
     "split_column",
 ]

@@ -183,9 +183,14 @@ def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:
 
 
 def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) -> NextExperiment:
-    """The first protocol that holds what this data lacks; the same again where it lacks nothing."""
+    """The first protocol that holds what this data lacks; the same again where it lacks nothing.
+
+    Before all others what would tell the first of ``names`` from the rest, as the catalogue has it.
+    """
     peak_n = found.fit.model.full_scale_load_n
+    telling = {word for rival in names[1:] for word in told_apart_by(effect(names[0]), effect(rival))}
     lacking = [word for word in SHOWN_BY if word not in excitation.present]
+    lacking.sort(key=lambda word: word not in telling)
     if excitation.goes_with_the_clock:  # which by itself leaves every cause half sure
         lacking.sort(key=lambda word: word != "shuffled_loads")
     if lacking:

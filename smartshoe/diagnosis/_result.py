@@ -18,6 +18,7 @@ from smartshoe.models.effects import Effect, in_words, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
+from smartshoe.recording import sample_rate_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -255,7 +256,7 @@ class Diagnosis(Summarised):
     def _sample_rate_hz(self) -> float:
         from smartshoe.calibration.provenance import without_rounding
 
-        return without_rounding(1.0 / float(np.median(np.diff(self.traces[0].time_s))))
+        return without_rounding(sample_rate_of(self.traces[0].time_s))
 
     def plot(self) -> Figure:
         """A figure: by recording, what the baseline and the extended model leave of the reading over time.

@@ -15,6 +15,7 @@ from smartshoe.identification._parametrisation import GreyBox
 from smartshoe.identification._prediction_error import LARGEST_DELAY_S
 from smartshoe.identification._uncertainty import CURVED, Function, profile_interval, t_quantile
 from smartshoe.models import X_OVER_NRT, Parameter
+from smartshoe.recording import sample_rate_of
 from smartshoe.signals.loading import rate_range
 from smartshoe.units import Unit
 
@@ -112,7 +113,7 @@ def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
         rmse_unit=output_unit,
         iterations=fit.iterations,
         converged=fit.converged,
-        sample_rate_hz=float(f"{1.0 / experiments[0].sample_time_s:.6g}"),  # free of rounding in the time stamps
+        sample_rate_hz=float(f"{sample_rate_of(experiments[0].time_s):.6g}"),
         reading_unit=choice.reading_unit,
         scale=scale,
         n_samples=problem.count,

@@ -81,6 +81,18 @@ def test_columns_split_into_name_and_unit(column: str, name: str, symbol: str) -
     assert split_column(column) == (name, unit(symbol))
 
 
+@given(st.floats(20.0, 400.0), st.integers(500, 3000), st.sampled_from([0.0, 0.2]))
+def test_sample_rate_is_that_of_the_logger_though_stamps_are_rounded_and_samples_lost(
+    rate_hz: float, count: int, lost: float
+) -> None:
+    """To milliseconds: the median step of 300 Hz is one of 333 Hz."""
+    time_s = np.round(np.arange(count) / rate_hz, 3)
+    if lost:
+        time_s = np.delete(time_s, slice(count // 3, count // 3 + int(lost * count)))
+    recording = Recording.from_arrays(time_s=time_s, force_n=np.zeros(time_s.size))
+    assert recording.sample_rate_hz == pytest.approx(rate_hz, rel=2e-3 * max(rate_hz / count, 0.5))
+
+
 @given(st.integers(2, 50), st.floats(0.001, 10.0))
 def test_sample_rate_is_that_of_the_grid(count: int, step: float) -> None:
     recording = Recording.from_arrays(time_s=np.arange(count) * step, force_n=np.zeros(count))

@@ -168,6 +168,15 @@ def test_where_peaks_go_with_the_clock_they_are_shuffled_first() -> None:
     assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads", "peaks")).protocol == "rates"
 
 
+def test_of_what_lacks_that_comes_first_which_tells_the_pair() -> None:
+    found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
+    lacking = "rates", "rests", "pauses", "steps"
+    told = {rivals: _unseen(found, rivals, _lacking(*lacking)).protocol for rivals in ((), ("delay", "sensor_lag"))}
+    assert told == {(): "rates", ("delay", "sensor_lag"): "steps"}
+    clocked = _lacking(*lacking, "shuffled_loads")
+    assert _unseen(found, ("delay", "sensor_lag"), clocked).protocol == "shuffled_loads"
+
+
 @pytest.mark.parametrize(
     ("channel", "pair", "logged"),
     [
