@@ -163,5 +163,5 @@ def sentence_of(
     elif worse or best.rmse > baseline.rmse:
         said = f"{good}; with {named} it is {'worse' if worse else 'no better'} there, good to {by_all}"
     else:
-        said = f"{good}, with {named} to {by_all}"
+        said = f"{good}, and to {by_all} with {named}"
     return said if verdict == "explained" else f"{said}{left}"

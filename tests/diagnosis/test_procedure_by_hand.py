@@ -180,11 +180,11 @@ def test_what_is_not_explained_is_the_larger_of_what_is_left_and_what_is_off_els
 
 def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
     good = "the baseline simulation is good to 20 % of full scale on data it was not fitted to"
-    assert _said("explained", "linear_leak") == f"{good}, with linear leak to 10 %"
-    assert _said("explained", "dead_band", "delay").endswith("with dead band and delay to 10 %")
-    assert _said("explained", "dead_band", "delay", "rate_gain").endswith("with dead band, delay and rate gain to 10 %")
+    assert _said("explained", "linear_leak") == f"{good}, and to 10 % with linear leak"
+    assert _said("explained", "dead_band", "delay").endswith("to 10 % with dead band and delay")
+    assert _said("explained", "dead_band", "delay", "rate_gain").endswith("to 10 % with dead band, delay and rate gain")
     rest = "over all recordings 3.4 % repeats and is not explained"
-    assert _said("partly_explained", "delay") == f"{good}, with delay to 10 %; {rest}"
+    assert _said("partly_explained", "delay") == f"{good}, and to 10 % with delay; {rest}"
     unsure = "the extended model is good to 10 %, by effects of which none is sure"
     assert _said("unexplained") == f"{good}; {rest}: {unsure}"
     no_effect = "and no effect of the catalogue accounts for it"
@@ -202,7 +202,7 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
         assert _said("adequate", left=quiet) == good
         assert _said("unexplained", left=quiet) == f"{good}: {unsure}"
         assert _said("unexplained", left=quiet, best=BEFORE, withheld=True) == f"{good}, {no_cause}"
-        assert _said("partly_explained", "delay", left=quiet) == f"{good}, with delay to 10 %"
+        assert _said("partly_explained", "delay", left=quiet) == f"{good}, and to 10 % with delay"
 
 
 def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged() -> None:

@@ -261,13 +261,13 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
 
     good = "the baseline simulation is good to 2 % of full scale on data it was not fitted to"
     assert said([], small) == ("adequate", good)
-    assert said(causes, small) == ("explained", f"{good}, with dead band, delay and zero offset to 1 %")
-    assert said(causes[:1], small)[1] == f"{good}, with dead band to 1 %"
+    assert said(causes, small) == ("explained", f"{good}, and to 1 % with dead band, delay and zero offset")
+    assert said(causes[:1], small)[1] == f"{good}, and to 1 % with dead band"
     rest = f"over all recordings {100 * large:.2g} % repeats and is not explained"
     assert said([], large) == (
         "unexplained", f"{good}; {rest}: the extended model is good to 1 %, by effects of which none is sure"
     )  # fmt: skip
-    assert said(causes[:2], large) == ("partly_explained", f"{good}, with dead band and delay to 1 %; {rest}")
+    assert said(causes[:2], large) == ("partly_explained", f"{good}, and to 1 % with dead band and delay; {rest}")
     # What laws usually depart by may be left, but not where no law of the kind follows.
     usual = 0.9 * limits.departure * large
     assert usual > limits.tolerable
