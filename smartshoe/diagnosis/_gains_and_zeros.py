@@ -182,10 +182,11 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     ]
     steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
     none = [replace(one, starts=one.starts[:0]) for one in steps]
-    for _ in range(MOST_CHANGES * len(fitted)):
+    slow, count = np.zeros(MOMENTS * len(fitted), dtype=bool), 0
+    while count < MOST_CHANGES * len(fitted):
         falls = gained.evidence.falls_beside(gained.kept, steps)
         each = zip(fitted_of(gained.sessions), moments, strict=True)
-        falls[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
+        falls[slow | ~np.concatenate([_may_change(*one) for one in each])] = -math.inf
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
@@ -196,8 +197,12 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
         alone = [*none[:k], StepColumns.of(one, moved[k], around), *none[k + 1 :]]
         at = int(around[np.argmax(gained.evidence.falls_beside(gained.kept, alone))])
         changed = _changed(one, at, zero_sd)
+        if of_zero and not _is_abrupt(changed, at, state.fit.model, state.thresholds):
+            slow[k * MOMENTS + j] = True
+            continue
         sessions = [changed if other is one else other for other in gained.sessions]
         gained = _Gained.of(state, sessions, gained.evidence.noise_sd)
+        slow[:], count = False, count + 1  # beside others it may be seen to be no stair
     return gained
 
 
@@ -205,6 +210,20 @@ def _may_change(session: Session, at: Index) -> Mask:
     """(k,) at which samples something may change: what is undone within a load cycle is what that cycle did."""
     known = session.cycle[[*session.gain_changes, *session.zero_changes]]
     return np.isin(session.cycle[at], known, invert=True)
+
+
+def _is_abrupt(session: Session, at: int, model: ExtendedModel, thresholds: Thresholds) -> bool:
+    """Whether the zero changes ``at`` a sample by what its change there amounts to, and not ever more on either side.
+
+    What creeps through a hold is followed by a stair; between the moments beside a step of it next to nothing happens.
+    """
+    left = session.reading - model.simulate(session.conditions)
+    own, known = own_of(session, model, left)
+    share = session.zero_sd * float(own[2 + len(session.gain_parts) + session.zero_changes.index(at)])
+    left, near = left - known, session.reading.size // (MOMENTS + 1)
+    before, after = (left[part][session.fitted[part]] for part in (slice(at - near, at), slice(at, at + near)))
+    seen = share + (float(after.mean() - before.mean()) if before.size and after.size else 0.0)
+    return thresholds.clear * seen * math.copysign(1.0, share) >= abs(share)
 
 
 def _changed(session: Session, at: int, zero_sd: float) -> Session:

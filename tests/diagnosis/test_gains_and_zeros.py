@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from told_evidence import taken_for_exact
 
 from smartshoe import Recording
-from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis import Thresholds, _gains_and_zeros
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gains_and_zeros import (
     _Gained,
+    _is_abrupt,
     changes_of,
     foretells,
     gains_of,
@@ -245,6 +246,29 @@ def test_what_one_load_cycle_reads_otherwise_is_no_zero_that_changes_and_changes
     told = with_likelier_gains(_state(CURVED, sessions), sessions) or sessions
     for one in told:
         assert len({*one.cycle[list(one.zero_changes)]}) == len(one.zero_changes)
+
+
+@pytest.mark.parametrize(("of_step", "is_jump"), [(0.0, False), (0.2, False), (0.7, True), (1.0, True), (-1.0, True)])
+def test_what_creeps_is_no_zero_that_jumps(of_step: float, is_jump: bool) -> None:
+    """2 % of full scale more within 25 s of a recording, and so much of it at 17 s."""
+    run = _run(1, 0.0)
+    reading, time_s = run.sensors[0], run.time_s
+    more = (1.0 - abs(of_step)) * np.clip((time_s - 5.0) / 25.0, 0.0, 1.0) + of_step * (time_s >= 17.0)
+    (session,) = _sessions(run.with_channel(replace(reading, values=reading.values + SPAN_MBAR * 0.02 * more)))
+    at = int(np.searchsorted(session.conditions.time_s, 17.0))
+    changed = replace(session, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
+    assert _is_abrupt(changed, at, CURVED, STANDARD) is is_jump
+
+
+def test_where_nothing_jumps_no_moment_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = _run(1, 0.0)
+    values = run.sensors[0].values + SPAN_MBAR * 0.015 * (run.time_s >= 14.0)
+    sessions = _sessions(_run(0, 0.0), run.with_channel(replace(run.sensors[0], values=values)), _run(2, 0.0))
+    state = _state(CURVED, sessions)
+    found = _Gained(sessions, Evidence(state.evidence.given, SD), state.start)
+    assert with_changes(state, found, of_zero=True) is not found
+    monkeypatch.setattr(_gains_and_zeros, "_is_abrupt", lambda *given: False)
+    assert with_changes(state, found, of_zero=True) is found
 
 
 def test_a_zero_that_changes_costs_what_its_prior_asks() -> None:
