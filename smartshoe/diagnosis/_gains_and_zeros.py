@@ -182,27 +182,26 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     ]
     steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
     none = [replace(one, starts=one.starts[:0]) for one in steps]
-    slow, count = np.zeros(MOMENTS * len(fitted), dtype=bool), 0
-    while count < MOST_CHANGES * len(fitted):
+    for _ in range(MOST_CHANGES * len(fitted)):
         falls = gained.evidence.falls_beside(gained.kept, steps)
         each = zip(fitted_of(gained.sessions), moments, strict=True)
-        falls[slow | ~np.concatenate([_may_change(*one) for one in each])] = -math.inf
-        if falls.max() < gained.odds_of_a_change:
+        falls[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
+        while falls.max() >= gained.odds_of_a_change:
+            k, j = divmod(int(np.argmax(falls)), MOMENTS)
+            one = fitted_of(gained.sessions)[k]
+            # Between the moments beside it, so that what changes once is not told as two changes around it.
+            around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
+            around = around[_may_change(one, around)]
+            alone = [*none[:k], StepColumns.of(one, moved[k], around), *none[k + 1 :]]
+            at = int(around[np.argmax(gained.evidence.falls_beside(gained.kept, alone))])
+            changed = _changed(one, at, zero_sd)
+            if not of_zero or _is_abrupt(changed, at, state.fit.model, state.thresholds):
+                break
+            falls[k * MOMENTS + j] = -math.inf  # beside others it may be seen to be no stair
+        else:
             break
-        k, j = divmod(int(np.argmax(falls)), MOMENTS)
-        one = fitted_of(gained.sessions)[k]
-        # Between the moments beside it, so that what changes once is not told as two changes around it.
-        around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
-        around = around[_may_change(one, around)]
-        alone = [*none[:k], StepColumns.of(one, moved[k], around), *none[k + 1 :]]
-        at = int(around[np.argmax(gained.evidence.falls_beside(gained.kept, alone))])
-        changed = _changed(one, at, zero_sd)
-        if of_zero and not _is_abrupt(changed, at, state.fit.model, state.thresholds):
-            slow[k * MOMENTS + j] = True
-            continue
         sessions = [changed if other is one else other for other in gained.sessions]
         gained = _Gained.of(state, sessions, gained.evidence.noise_sd)
-        slow[:], count = False, count + 1  # beside others it may be seen to be no stair
     return gained
 
 
@@ -217,10 +216,9 @@ def _is_abrupt(session: Session, at: int, model: ExtendedModel, thresholds: Thre
 
     What creeps through a hold is followed by a stair; between the moments beside a step of it next to nothing happens.
     """
-    left = session.reading - model.simulate(session.conditions)
-    own, known = own_of(session, model, left)
-    share = session.zero_sd * float(own[2 + len(session.gain_parts) + session.zero_changes.index(at)])
-    left, near = left - known, session.reading.size // (MOMENTS + 1)
+    ((_, _, steps),) = _own_of_each([session], model)
+    share = session.zero_sd * float(steps[session.zero_changes.index(at)])
+    left, near = residual_of(session, model), session.reading.size // (MOMENTS + 1)
     before, after = (left[part][session.fitted[part]] for part in (slice(at - near, at), slice(at, at + near)))
     seen = share + (float(after.mean() - before.mean()) if before.size and after.size else 0.0)
     return thresholds.clear * seen * math.copysign(1.0, share) >= abs(share)

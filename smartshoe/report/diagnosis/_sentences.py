@@ -132,15 +132,21 @@ def _percent_text(percent: float, low: float, high: float) -> str:
     return f"{plain(percent, 2)} %{span}".replace("-", "−")
 
 
+def _way_of(gain: Gain) -> tuple[bool, float, float, float]:
+    """Whether the error rises; by how many percent it does, or falls, and the interval of that."""
+    low, high = gain.ci95
+    if gain.gain_percent < 0:
+        return True, -gain.gain_percent, -high, -low
+    return False, gain.gain_percent, low, high
+
+
 def gain_sentence(gain: Gain) -> str:
     """The error without and with something, on data that was not fitted."""
     if not math.isfinite(gain.gain_percent):
         return "What it gains on data that was not fitted is not known."
     without, within = two_numbers(gain.rmse_before, gain.rmse_after)
-    low, high = gain.ci95
-    outcome = f"falls by {gain_text(gain)}"
-    if gain.gain_percent < 0:
-        outcome = f"rises by {_percent_text(-gain.gain_percent, -high, -low)}"
+    rises, *change = _way_of(gain)
+    outcome = f"{'rises' if rises else 'falls'} by {_percent_text(*change)}"
     return (
         f"On data that was not fitted, the error is {without} {gain.unit} without it and {within} {gain.unit} with it:"
         f" it {outcome}."
@@ -240,13 +246,11 @@ def what_was_gained(diagnosis: Diagnosis) -> str:
     if won is None or not math.isfinite(won.gain_percent):
         return added
     together = "Together they" if len(names) + len(diagnosis.minor) > 1 else "It"
-    rises = won.gain_percent < 0
+    rises, percent, low, high = _way_of(won)
     way = ("raise" if rises else "lower") + ("" if together.endswith("they") else "s")
-    low, high = (-won.ci95[1], -won.ci95[0]) if rises else won.ci95
     span = f"{plain(low)} to {plain(high)} %".replace("-", "−")
     return (
-        f"{added} {together} {way} the error on data that was not fitted by {plain(abs(won.gain_percent))} %"
-        f" (95 % interval {span})."
+        f"{added} {together} {way} the error on data that was not fitted by {plain(percent)} % (95 % interval {span})."
     )
 
 
