@@ -159,7 +159,7 @@ def sentence_of(
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
     elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong
-        said = f"{good}, each recording's own zero and gain allowed for; {named} is found in these"
+        said = f"{good}, the recordings' own zeros allowed for; {named} is found in these"
     elif worse or best.rmse > baseline.rmse:
         said = f"{good}; with {named} it is {'worse' if worse else 'no better'} there, good to {by_all}"
     else:

@@ -142,9 +142,9 @@ def _drifted(session: Session, model: ExtendedModel) -> Array:
     return model.simulate(session.conditions) - _without_what_rests_show(model).simulate(session.conditions)
 
 
-def _without_what_rests_show(model: ExtendedModel) -> ExtendedModel:
+def _without_what_rests_show(model: ExtendedModel, *, but_for_drifts: bool = False) -> ExtendedModel:
     for part in model.parts:
-        if part.effect.is_seen_at_rest:
+        if part.effect.is_seen_at_rest and not (but_for_drifts and part.effect.goes_with_the_clock):
             model = model.without(part.name)
     return model
 
@@ -153,8 +153,10 @@ def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, th
     """Whether an offset may be how far the zero had drifted before the recordings began.
 
     It drifts the same way, and what it drifts by in a recording is of the offset's order of magnitude: what settles
-    may have been under way for a few of its time constants.
+    may have been under way for a few of its time constants. What follows another channel, as a neighbour's pressure, is
+    no drift: the recording holds all of it.
     """
+    model = _without_what_rests_show(model, but_for_drifts=True)
     moves = [_drifted(one, model) for one in fitted_of(sessions)]
     moved = sum(float(one[-1] - one[0]) for one in moves) / max(len(moves), 1)
     return value * moved > 0.0 and abs(value) <= thresholds.extrapolates * abs(moved)

@@ -165,6 +165,18 @@ def test_an_offset_that_a_drift_of_the_zero_may_have_come_by_is_its_past(sign: f
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_offset_beside_a_neighbour_is_none_of_a_drift(sign: float) -> None:
+    """A neighbour that is loaded as the recording ends moves the reading then, and was logged from the beginning on."""
+    sessions, scale = _sessions(_run(offset=0.03 * sign, seed=1), _run(offset=0.03 * sign, seed=2))
+    beside = np.clip(TIME_S / 6.0 - 8.0, 0.0, 1.0)
+    beside_them = [replace(one, conditions=replace(one.conditions, neighbour=beside)) for one in sessions]
+    pressed = baseline_of(sessions, scale).with_part(effect("cross_talk"), np.array([0.01 * sign]))
+    (found,) = zeros_of(beside_them, pressed, scale, 0.0, 0.0, STANDARD)
+    assert found.effect.name == "zero_offset"
+    assert not found.is_past
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_no_tare_is_told_where_a_drift_may_have_come_by_what_is_read_beyond_the_load(sign: float) -> None:
     """The unit may bear the load that is shown: a drift that is known explains more than a tare and an offset."""
     duration_s = float(TIME_S[-1])
