@@ -102,6 +102,20 @@ def test_without_repeats_nothing_is_said_of_coloured_noise() -> None:
 
 
 @settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_weights_put_on_by_hand_are_no_equal_cycles(seed: int) -> None:
+    """Cycles of one peak and one rate whose weights stay for other times: a curve that is missed differs in them."""
+    rng = np.random.default_rng(seed)
+    weights = np.array([0.2, 0.4, 0.6, 0.8, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0])
+    stay = [np.repeat(weights, rng.integers(200, 800, weights.size)) for _ in range(4)]
+    load = np.convolve(np.concatenate([np.zeros(300), *stay]), np.ones(20) / 20.0, mode="same")
+    prediction = 0.9 * load + 0.1 * lag(load, 0.3, STEP_S)
+    residual = 0.01 * load * (1.0 - load) + FLOOR * rng.standard_normal(load.size)
+    conditions = Conditions(STEP_S * np.arange(load.size), load, STEP_S)
+    assert TESTS["coloured_noise"].evidence(residual, conditions, prediction) is None
+
+
+@settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 10**6), strength=st.floats(0.0015, 0.005))
 def test_noise_that_grows_with_pressure_is_told_from_jitter(seed: int, strength: float) -> None:
     rng = np.random.default_rng(seed)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +13,13 @@ from smartshoe.models.effects._sensor_evidence import NoiseEffect, SensorEvidenc
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.effects.exposure import by
 
+if TYPE_CHECKING:
+    from smartshoe.signals.loading import Cycle
+
 MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each
 QUANTILE = 3.588  # normal, of one false alarm in 1000 over the number of memories
 LEAST_INDEPENDENT = 40  # segments of one memory's length, below which that memory is left out
-SAME_PEAK = 0.05
+SAME_LOAD = 0.05  # of the peak: loads that are equal
 CORNER = 0.1  # of the noise: a prediction that bends more from one sample to the next
 
 
@@ -92,22 +96,13 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
 
     load = conditions.load
     for group in by_rate(cycles(conditions.time_s, load)).values():
-        peaks = np.array([float(load[cycle.start : cycle.stop].max()) for cycle in group])
-        equal = [
-            cycle
-            for cycle, peak in zip(group, peaks, strict=True)
-            if abs(peak - np.median(peaks)) <= SAME_PEAK * np.median(peaks)
-        ]
-        equal.sort(key=lambda cycle: cycle.start)
-        if len(equal) > 2:
-            equal = equal[1:]  # the first of its kind comes after others: a wrong memory would tell it from the rest
-        if len(equal) < 2:
+        starts, n = _equal(group, load)
+        if len(starts) > 2:
+            starts = starts[1:]  # the first of its kind comes after others: a wrong memory would tell it from the rest
+        if len(starts) < 2 or n < 30:
             continue
-        n = min(cycle.stop - cycle.start for cycle in equal)
-        if n < 30:
-            continue
-        aligned = np.stack([residual[cycle.start : cycle.start + n] for cycle in equal])
-        shape = np.mean([prediction[cycle.start : cycle.start + n] for cycle in equal], axis=0)
+        aligned = np.stack([residual[start : start + n] for start in starts])
+        shape = np.mean([prediction[start : start + n] for start in starts], axis=0)
         counted = 1.0 - _corners(shape, float(np.median(np.abs(np.diff(aligned, axis=1)))))
         if np.count_nonzero(counted) < 30:
             continue
@@ -116,7 +111,7 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
         basis = np.linalg.qr(regressors)[0]
         taken = np.sum([_autocovariance(column) for column in basis.T], axis=0)
         pairs = _autocovariance(counted)
-        repeats = len(equal)
+        repeats = len(starts)
         # Helmert's contrasts: as many independent series as repeats less one, each as noisy as a repeat.
         for row in range(1, repeats):
             contrast = np.zeros(repeats)
@@ -124,6 +119,32 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
             series = counted * (contrast @ aligned) / math.sqrt(row * (row + 1.0))
             series = series - basis @ (basis.T @ series)
             yield series, taken * float(series @ series) / (pairs[0] - basis.shape[1]), pairs
+
+
+def _equal(group: Sequence[Cycle], load: Array) -> tuple[list[int], int]:
+    """Where those of one rate begin, and for how many samples, that reach one peak by one course.
+
+    Where loads differ, what a model misses differs with them: weights that are put on by hand, and random loads, have
+    cycles of one rate and one peak, and no two that are equal. They are laid over each other where they rise through
+    half of their peak, since a cycle after a rest begins anywhere in it.
+    """
+    peaks = np.array([float(load[cycle.start : cycle.stop].max()) for cycle in group])
+    within = SAME_LOAD * float(np.median(peaks))
+    high = [(cycle, peak) for cycle, peak in zip(group, peaks, strict=True) if abs(peak - np.median(peaks)) <= within]
+    if not high:
+        return [], 0
+    rises = [cycle.start + int(np.argmax(load[cycle.start : cycle.stop] >= 0.5 * peak)) for cycle, peak in high]
+    before = min(rise - cycle.start for (cycle, _), rise in zip(high, rises, strict=True))
+    n = before + min(cycle.stop - rise for (cycle, _), rise in zip(high, rises, strict=True))
+    starts = sorted(rise - before for rise in rises)
+    courses = np.stack([load[start : start + n] for start in starts])
+    usual = courses[np.argmin(_rms(courses - np.median(courses, axis=0)))]
+    return [start for start, off in zip(starts, _rms(courses - usual), strict=True) if off <= within], n
+
+
+def _rms(rows: Array) -> Array:
+    """(m,) of each of the rows (m, n)."""
+    return np.asarray(np.sqrt(np.mean(rows**2, axis=1)))
 
 
 def _corners(shape: Array, noise: float) -> Array:
