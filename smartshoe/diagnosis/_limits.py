@@ -193,13 +193,23 @@ def past_of(zero: Zero, scale: Scale) -> str:
     )
 
 
-def led_back_of(zero: Zero, scale: Scale) -> str:
-    """What is said of a zero that is led back from loads so high that the unit may do anything below."""
-    value = zero.value * scale.reading
+def led_back_of(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
+    """What is said of a zero that is led back from loads so high that the unit may do anything below, or from a past.
+
+    Of a unit that is unloaded in the recordings, though never as they begin, nothing but its past is unknown.
+    """
+    stands = (
+        f"the reading stands at {zero.value * scale.reading:.3g} {scale.unit.symbol} ({100 * zero.size:.2g} % of full"
+        " scale): an offset, a tare, or what the unit"
+    )
+    if zero.led_from <= thresholds.standing:
+        return (
+            f"without load {stands} remembers of loads before the recordings, of which this data shows nothing (record"
+            " a rest before the first load)"
+        )
     return (
-        f"led back to no load from {100 * zero.led_from:.2g} % of it, the reading stands at {value:.3g}"
-        f" {scale.unit.symbol} ({100 * zero.size:.2g} % of full scale): an offset, a tare, or what the unit does below"
-        " such loads, or remembers of those before, of which this data shows nothing (record a rest without load)"
+        f"led back to no load from {100 * zero.led_from:.2g} % of it, {stands} does below such loads, or remembers of"
+        " those before, of which this data shows nothing (record a rest without load)"
     )
 
 

@@ -57,7 +57,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
     names = tuple(one for one in seen.names if one.effect not in clocks)
     before = () if parted is None else (parted,)
     past = tuple(past_of(one, given.scale) for one in zeros if one.is_past)
-    led = tuple(led_back_of(one, given.scale) for one in zeros if one.led_from and not one.is_past)
+    led = tuple(led_back_of(one, given.scale, thresholds) for one in zeros if one.led_from and not one.is_past)
     # A zero that jumps within recordings is no offset.
     kept = tuple(
         one

@@ -21,6 +21,7 @@ from smartshoe.diagnosis._limits import (
     crept_of,
     elsewhere_of,
     end_of_range_of,
+    led_back_of,
     not_shown_of,
     other_kind_of,
     own_gains_of,
@@ -234,6 +235,20 @@ def test_a_past_is_said_in_the_readings_unit() -> None:
     zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
     assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, replace(SCALE, reading=140.0))
     assert "the zero stands at 7 mbar where" in past_of(zero, SCALE)  # it falls as the load grows
+
+
+def test_a_zero_that_is_seen_later_on_is_led_back_from_no_load() -> None:
+    """Of a unit that was unloaded between its loads nothing is unknown but what was before the recordings."""
+    shift = shift_of("reading")
+    for led_from, begins, asked in (
+        (0.019, "without load the reading stands at 7 mbar (5 %", "before the first load"),
+        (0.021, "led back to no load from 2.1 % of it, the reading stands at 7 mbar (5 %", "without load"),
+    ):
+        zero = Zero(shift, 0.05, 0.01, 0.05, ("load_cell_tare",), led_from=led_from)
+        said = led_back_of(zero, replace(SCALE, reading=140.0), STANDARD)
+        assert said.startswith(begins)
+        assert said.endswith(f"(record a rest {asked})")
+        assert ("below such loads" in said) == (led_from > STANDARD.standing)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
