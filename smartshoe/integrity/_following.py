@@ -19,7 +19,7 @@ RISES_WITH_LOAD = ("pressure", "force")
 def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``does_not_follow_load``: fatal; the reading is constant, noise, or another channel's."""
     whole = np.ones(len(view.recording), dtype=bool)
-    reading, load = view.reading, view.load
+    reading = view.reading
     if float(np.ptp(reading.values)) == 0.0:
         says = "the reading is constant: is the unit connected, and is this its column?"
     else:
@@ -37,7 +37,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
             f" curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed; is this the unit that was"
             " pressed?"
         )
-        if view.load_span <= 2.0 * load.largest * load.quiet_noise:
+        if _is_noise(view):
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
     yield Finding.fatal("does_not_follow_load", whole, says)
 
@@ -45,7 +45,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
 def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``wrong_sign``: a load that is negative in compression, or a pressure (or force) that falls as load rises.
 
-    Counts, volts and lengths may fall.
+    Counts, volts and lengths may fall, and so may what creeps under a load that stands.
     """
     at, whole = view.curve[0], np.ones(len(view.recording), dtype=bool)
     if at[-1] < -view.thresholds.same * at[0]:
@@ -54,10 +54,15 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
             " compression is positive (a minus before the column does so: --force '-COLUMN')"
         )
         yield Finding.fatal("wrong_sign", whole, says)
-    elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD:
+    elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD and not _is_noise(view):
         name = view.recording.sensor.name
         says = f"the {name} falls as the load rises: turn the sign of one of the two (load is positive in compression)"
         yield Finding("wrong_sign", whole, says)
+
+
+def _is_noise(view: View) -> bool:
+    """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp."""
+    return view.load_span <= 2.0 * view.load.largest * view.load.quiet_noise
 
 
 def _followed_share(view: View) -> tuple[float, float]:

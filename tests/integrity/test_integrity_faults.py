@@ -369,6 +369,18 @@ def test_wrong_sign_and_the_sign_of_what_is_no_pressure():
     assert kinds(examine([counts])) == set()
 
 
+@settings(max_examples=12)
+@given(SEEDS, st.sampled_from([1.0, -1.0]), st.floats(2.0, 30.0))
+def test_what_creeps_under_a_load_that_stands_has_no_wrong_sign(seed: int, way: float, tau_s: float) -> None:
+    """The noise of a load that stands rises and falls with what creeps by chance."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 40.0, 0.01)
+    pressure = 70.0 + way * 10.0 * np.exp(-time_s / tau_s) + 0.05 * rng.standard_normal(time_s.size)
+    force_n = 350.0 + 0.2 * rng.standard_normal(time_s.size)
+    held = Recording.from_arrays(time_s=time_s, force_n=force_n, pressure_mbar=pressure)
+    assert "wrong_sign" not in kinds(examine([held]))
+
+
 @pytest.mark.parametrize("what", ["constant", "noise", "load at rest"])
 def test_a_reading_that_does_not_follow_is_refused(what):
     recording = recorded(dynamic_protocol(), 1)
