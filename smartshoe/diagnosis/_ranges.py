@@ -54,6 +54,14 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 else ": what lies below is extrapolated"
             )
         )
+    low, high = min(float(load.min()) for load, _ in kept), max(float(load.max()) for load, _ in kept)
+    if thresholds.clear * low > high and not any(within):
+        trap = True
+        said.append(
+            f"the load stays at {_told(low * scale.load_n)} to {_told(high * scale.load_n)} N throughout, and the"
+            " reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load it"
+            " over its range)"
+        )
     said += _foreign([(one.recording.name, gain) for one, gain in zip(fitted, within, strict=True)], thresholds)
     said += _unlike(fitted, thresholds)
     between = _between(kept, thresholds.same)
@@ -158,6 +166,8 @@ def _told(value: float) -> str:
 
 def _gain(load: Array, reading: Array, follows: float) -> float | None:
     """Slope of reading on load within a file, None where load explains less of its variance than ``follows``."""
+    if not load.size:
+        return None
     a, b = load - load.mean(), reading - reading.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b / (a @ a)) if size > 0 and float(a @ b) ** 2 > follows * size**2 else None

@@ -245,6 +245,22 @@ def test_a_range_is_narrow_where_its_least_is_more_than_half_of_its_largest() ->
     assert len(_told(_line(0.9, 1.0), _line(0.85, 1.0)).says) == 1
 
 
+def test_of_a_load_that_stands_throughout_nothing_is_told() -> None:
+    """As under one dead weight: a reading that creeps shows no gain. Files at two levels show one."""
+    still = [_file(np.full(101, level), 0.5 + np.linspace(0.0, 0.1, 101)) for level in (0.6, 0.7, 1.3)]
+    for files in (still[:1], still[:2]):
+        found = _told(*files)
+        assert found.is_trap
+        assert found.says[0].startswith(f"the load stays at 480 to {560 if len(files) > 1 else 480} N throughout")
+    assert not any("throughout" in one for one in _told(*still).says)
+    assert not any("throughout" in one for one in _told(_line(0.6, 0.7)).says)
+
+
+def test_files_without_a_load_in_common_are_no_alike() -> None:
+    """One lies all above the other's largest load."""
+    assert not any("as high" in one for one in _told(_line(0.90, 0.91), _line(0.92, 0.93)).says)
+
+
 def test_a_narrow_range_is_told_with_its_numbers() -> None:
     flat, steep = _line(0.8, 1.0, slope=0.6), _line(0.6, 1.0, slope=0.9)
     for files, gain in (((flat,), 0.6), ((flat, steep), 0.75)):
