@@ -30,7 +30,7 @@ from smartshoe.diagnosis._gains_and_zeros import (
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier, with_laws
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
-from smartshoe.diagnosis._members import Member, begun_with, members_of
+from smartshoe.diagnosis._members import Member, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
@@ -106,13 +106,8 @@ def infer(
             state, found = with_blocks, other
     found, members = _likeliest(found, plain, sessions, progress)
     if found.is_stepped_down:
-        first = _first_step(begun, state)
-        again = None if first is None else _validated(first, plain, sessions)
-        if again is not None and not again.is_stepped_down:
-            found, members = _likeliest(again, plain, sessions, progress)
-        else:
-            found = found.with_nothing_but(plain)
-            members = found.members()
+        found = found.with_nothing_but(plain)
+        members = found.members()
     alone, refused = None, found.refused
     nameable = [one for one in members if one.name not in found.undone]
     if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in nameable):
@@ -144,9 +139,6 @@ def _sought(begun: State, progress: Progress) -> State:
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         state = better_from(with_another_pole(state), state, progress)
-    if is_stretched(state.fit.model):
-        progress("trying what delays a reading in the place of an arm that is at its bounds")
-        state = better_from(with_a_latency(begun), state, progress)
     if state.fit.model.relaxing_share < 0.0:
         state = better_from(with_an_arm_that_creeps(state), state, progress)
     return better_from_one(begun, state, progress)
@@ -189,12 +181,6 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     extended = left_out.following(whole)
     refused = [name for name in whole.model.names if name not in extended.model.names]
     best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name not in refused))
-    if extended.model.parts and error_of(sessions, extended.model) >= most:
-        # A model that others had bent: from the plain one, each effect at its likeliest shape.
-        model = plain.model
-        for one in (given.candidates[m].effect for m in best.members):
-            model = fit(likelihood, begun_with(one, model, likelihood), FEW_STEPS).model
-        extended = fit(likelihood, model)
     undone = cancelling(sessions, extended.model, state.thresholds)
     if undone:
         less = {name: fit(likelihood, extended.model.without(name)) for name in undone}
@@ -275,15 +261,6 @@ def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) ->
         and one.name not in plain.model.names
     ]
     return min(twice, key=lambda one: one.size, default=None)
-
-
-def _first_step(begun: State, state: State) -> State | None:
-    """The first set of the last search, before other effects bent it: it may stand where what it led to does not."""
-    path = [model for model in state.path if len(model.parts) > len(begun.fit.model.parts)]
-    if not path or {*path[0].names} == {*state.fit.model.names}:
-        return None
-    evidence, best = evidence_about(path[0], begun.evidence)
-    return State(evidence, best, fit(begun.likelihood(), path[0]), state.banned)
 
 
 def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:
