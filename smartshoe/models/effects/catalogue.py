@@ -77,7 +77,7 @@ def _try(made: Effect, origin: str) -> None:
     """Run an effect of another package once at each of its shapes; raises `UsageError` with what it does wrong."""
     load = 1.0 - np.abs(np.linspace(-1.0, 1.0, 32))
     load.flags.writeable = False  # what writes to its input spoils that of others
-    time_s, nothing = 0.02 * np.arange(load.size), np.zeros(load.size)
+    time_s, nothing = np.linspace(0.0, 0.02 * (load.size - 1), load.size), np.zeros(load.size)
     at = Conditions(time_s, load, 0.02, temperature_k=nothing, neighbour=nothing, relaxing=(0.06, 0.2))
     for shape in made.shapes:
         try:
