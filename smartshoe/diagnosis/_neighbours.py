@@ -72,8 +72,9 @@ def _beside(recording: Recording, neighbour: Channel, usable: Mask, thresholds: 
     foretold = np.column_stack([np.ones(force.size), force, force**2, *behind])[mask]
     reading, other = sensor.values[mask], neighbour.in_unit(sensor.unit)[mask]
     as_well = np.column_stack([np.ones(other.size), other])
-    is_copy = float(np.std(_left(as_well, reading))) < (1.0 - thresholds.same) * noise_sd(reading, thresholds)
     left, left_of_other = _left(foretold, reading), _left(foretold, other)
+    # Of what the load does not foretell: fast loads bend a reading as noise does.
+    is_copy = float(np.std(_left(as_well, reading))) < (1.0 - thresholds.same) * noise_sd(left, thresholds)
     return _Beside(float(left @ left_of_other), float(left_of_other @ left_of_other), is_copy)
 
 

@@ -76,6 +76,14 @@ def test_the_same_channel_in_another_column_is_none_and_one_with_noise_of_its_ow
     assert _of(_recording(meta1=0.3 * (READING - _noise(3)) + _noise(4))) == ([["meta1"]], [])
 
 
+def test_one_under_the_same_quick_load_is_no_copy() -> None:
+    """At ten samples a period third differences are the load's, and no noise."""
+    load = 400.0 + 400.0 * np.sin(2 * np.pi * 5.0 * TIME_S)
+    one = Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=0.1 * load + _noise(1))
+    other = Channel.from_values("meta1", 0.05 * load + _noise(2), MILLIBAR)
+    assert _of(one.with_channel(other)) == ([["meta1"]], [])
+
+
 def test_cross_talk_is_named_of_the_second_of_two_neighbours() -> None:
     found = diagnose(_recording(toe=TOE, heel=HEEL))
     assert [cause.name for cause in found.causes] == ["cross_talk"]
