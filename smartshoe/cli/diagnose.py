@@ -175,7 +175,7 @@ def _design(path: str, json_path: str | None) -> None:
     if not protocols:
         raise source.error(("protocol",), "there is none, and a design asks about protocols: add a [protocol.dynamic]")
     unit, percent = noise_of(scenario, source) or (None, USUAL_NOISE_PERCENT)
-    said_by = "since no unit of the scenario states any"
+    said_by = "since no unit of the scenario states any above 0"
     if unit is not None:
         said_by = f"the largest that a unit of the scenario states ({unit})"
     rate_hz = sample_rate_of(scenario, source) or USUAL_RATE_HZ

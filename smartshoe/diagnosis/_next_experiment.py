@@ -81,14 +81,16 @@ def next_experiment(
 def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
     """The shortest protocol that rules a cause's nearest equivalent out, or tells clearly more than this data.
 
-    Of those that this data does not hold already. Where none rules it out, the channel that would, if there is one.
+    Of those that this data does not hold already, and of which its logger takes enough samples to tell anything. Where
+    none rules it out, the channel that would, if there is one.
     """
     rival = cause.equivalents[0]
     now = _contest(found, cause, rival)
     peak_n, least_s = found.fit.model.full_scale_load_n, min(one.recording.sample_time_s for one in sessions)
     made = [make(peak_n) for make in EXPERIMENTS.values()]
+    seen = [one for one in made if one.duration_s >= thresholds.least_samples * least_s]
     held = now.cause.likelihood.sessions
-    left = [one for one in made if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
+    left = [one for one in seen if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
     no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
     foretold: list[tuple[Protocol, Contest]] = []
     for protocol in sorted(left, key=lambda one: one.duration_s):

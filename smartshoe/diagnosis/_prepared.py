@@ -10,6 +10,7 @@ from smartshoe.diagnosis._aligned import aligned, as_they_follow
 from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
 from smartshoe.diagnosis._session import Session, at_full_rate, prepare
@@ -43,6 +44,7 @@ class Prepared:
 
 def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> Prepared:
     """Of ``recordings``, of which the first ``count`` are fitted; the others judge."""
+    recordings, said_of_neighbours = with_one_neighbour(recordings, count, integrity.usable, thresholds)
     clocks = aligned(recordings, integrity)
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
@@ -62,7 +64,13 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
-    limits = [*clocks.says, *ranges.says, *(said for said in said_of_curve if said is not None), *excitation.limits()]
+    limits = [
+        *said_of_neighbours,
+        *clocks.says,
+        *ranges.says,
+        *(said for said in said_of_curve if said is not None),
+        *excitation.limits(),
+    ]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])

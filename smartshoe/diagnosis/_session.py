@@ -19,11 +19,12 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
+from smartshoe.diagnosis._neighbours import neighbours_of
 from smartshoe.diagnosis._scale import Scale, reading_in
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects.cycle_conditioning import half_way
-from smartshoe.recording import Channel, Recording
+from smartshoe.recording import Recording
 from smartshoe.signals.loading import rises_of
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
@@ -346,20 +347,13 @@ def smoothed(signal: Array, weights: Array, factor: int) -> Array:
 def _logged_beside(recording: Recording, time_s: Array, scale: Scale) -> dict[str, Array]:
     """Temperature and neighbour (n,), as conditions have them, of which any sample is there."""
     found = {}
-    temperature, neighbour = recording.channels.get("temperature"), _neighbour(recording)
+    temperature, neighbours = recording.channels.get("temperature"), neighbours_of(recording)
     if temperature is not None and temperature.role == "auxiliary" and temperature.present.any():
         found["temperature_k"] = bridged(time_s, temperature.si, temperature.present)
-    if neighbour is not None:
-        share = neighbour.in_unit(scale.unit) / abs(scale.reading)
-        found["neighbour"] = bridged(time_s, share, neighbour.present)
+    if neighbours:
+        share = neighbours[0].in_unit(scale.unit) / abs(scale.reading)
+        found["neighbour"] = bridged(time_s, share, neighbours[0].present)
     return found
-
-
-def _neighbour(recording: Recording) -> Channel | None:
-    """Another unit's reading beside the one that is diagnosed."""
-    quantity = recording.sensor.unit.quantity
-    others = [c for c in recording.of_role("auxiliary") if c.unit.quantity == quantity and c.name != "reference"]
-    return next((one for one in others if one.present.any()), None)
 
 
 def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:

@@ -104,7 +104,8 @@ def _reach_s(logged: Array, changes: Index, edge: Array, edge_s: Array, rate: Ar
 def _gain(logged: Array, between: Array, reading: Array) -> float | None:
     """Reading per load, where the reading goes with the load ``between`` steps, (n,) each; None where it stands.
 
-    By the steps that the load goes through, up or down: at others it may have stood.
+    By the steps that the load goes through, up or down: at others it may have stood. A load that is sampled once on
+    each of them, as a commanded ramp, moves within none: what is left of it there is rounding.
     """
     gain = float(np.polyfit(logged, reading, 1)[0])
     is_new = np.diff(logged, prepend=np.nan) != 0.0
@@ -112,6 +113,8 @@ def _gain(logged: Array, between: Array, reading: Array) -> float | None:
     through = np.concatenate([[False], way[1:] == way[:-1], [False]])
     visit = np.cumsum(is_new) - 1
     moved, read = (_within(one, visit) * through[visit] for one in (between - logged, reading))
+    if np.max(np.abs(moved)) <= ROUNDING * np.max(np.abs(logged)):
+        return None
     return abs(gain) if gain != 0.0 and 2.0 * float(moved @ read) / gain > float(moved @ moved) else None
 
 

@@ -147,6 +147,9 @@ def test_the_command_takes_the_largest_noise_of_the_scenarios_units(
     wrong = units.replace("2.0", "-2.0")
     assert run_command(_asked(tmp_path, "[protocol.dynamic]\n" + wrong)) != 0
     assert "unit.1.sensor.noise_percent" in capsys.readouterr().err
+    silent = "[protocol.dynamic]\nrates_n_per_s = [200.0]\n" + units.replace("0.5", "0").replace("2.0", "0")
+    assert run_command(_asked(tmp_path, silent)) == 0
+    assert "since no unit of the scenario states any above 0" in capsys.readouterr().err  # each states one
 
 
 def test_the_command_takes_the_lowest_rate_that_a_unit_is_logged_at(

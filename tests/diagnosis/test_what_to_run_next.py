@@ -12,7 +12,7 @@ from courses import STANDARD, STEP_S, prepared, pressed, triangles
 from numpy.typing import NDArray
 from test_diagnosis_parts import MODEL, likelihood_of, recording, sessions_of
 
-from smartshoe import Protocol, Recording
+from smartshoe import Protocol, Recording, diagnose
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._likelihood import fit
@@ -250,6 +250,17 @@ def test_protocols_are_what_they_say() -> None:
     assert _rates(made["minor_loops"]) == {0.1, 0.4}
     assert len(_rates(made["shuffled_loads"])) == 1
     assert _rates(made["long_hold"]) == {0.25, round(1 / 3, 6)}
+
+
+def test_a_log_that_takes_hardly_a_sample_of_a_protocol_is_asked_for_none_of_those() -> None:
+    """As one that logs every two minutes, or whose time is in another unit: a protocol of a minute has no course there.
+
+    It ended in "steps holds one sample", of a protocol that nobody had given.
+    """
+    one = recording(MODEL.with_part(effect("play_hysteresis"), effect("play_hysteresis").begun(sizes=1.0)))
+    found = diagnose(replace(one, time_s=5000.0 * one.time_s))
+    assert any(cause.equivalents for cause in found.causes)
+    assert found.next_experiment is not None
 
 
 def test_a_protocol_goes_with_its_load() -> None:

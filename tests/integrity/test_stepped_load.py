@@ -98,6 +98,19 @@ def test_weights_are_as_heavy_as_they_are_logged() -> None:
     assert (found is recording, told) == (True, [])
 
 
+@pytest.mark.parametrize("seed", range(8, 12))
+def test_a_commanded_staircase_of_even_ramps_is_on_no_grid(seed: int) -> None:
+    """One sample on each level of its ramps: within them it moves by rounding alone, which any reading may go with."""
+    corners = [(0.0, 0.0), (3.0, 0.0)]
+    for k, level in enumerate((200.0, 400.0, 600.0, 800.0, 600.0, 400.0, 200.0, 0.0)):
+        corners += [(4.0 + 8.0 * k, level), (11.0 + 8.0 * k, level)]
+    time_s = 0.02 * np.arange(3400)
+    load = np.round(np.interp(time_s, *zip(*corners, strict=True)), 5)
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(load.size)
+    recording = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=0.1 * load + noise)
+    assert between_steps(recording, STANDARD)[1] == []
+
+
 def test_a_grid_that_noise_takes_out_is_left_and_so_is_a_fine_one() -> None:
     noisy = RAMPS_N + 8.0 * np.random.default_rng(2).standard_normal(RAMPS_N.size)
     for load, step_n in ((noisy, STEP_N), (RAMPS_N, 0.5), (RAMPS_N, 1e-6)):

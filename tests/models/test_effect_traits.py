@@ -284,9 +284,33 @@ def _shown(word: str) -> Effect:
     return type("Shown", (Crease,), {"exposed_by": frozenset({word})})()
 
 
+def _failing(**wrong: object) -> Effect:
+    return type("Failing", (Crease,), wrong)()
+
+
+def _with_a_bug(self: Effect, *_: object) -> Any:
+    raise KeyError("gauge")
+
+
+def _in_place(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Array:
+    signal *= 1.0 + values[0]
+    return signal
+
+
 @pytest.mark.parametrize(
     ("offer", "said"),
     [
+        (_failing(apply=_with_a_bug), r"'Wrong' fails \(KeyError: 'gauge'\): mend or uninstall the package"),
+        (_failing(apply=lambda self, signal, conditions, values: signal[:5]), r"of shape \(5,\) for a signal"),
+        (_failing(apply=lambda self, signal, conditions, values: 3.0), r"of shape \(\) for a signal"),
+        (_failing(apply=_in_place), "read-only"),
+        (_failing(inverse=_with_a_bug), "fails .*gauge"),
+        (_failing(inverse=lambda self, values, step_s: 5), "gives 5, which is neither an Inverse nor None"),
+        (
+            _failing(parameters=(EffectParameter("knee", "FS_load", "where it bends", None, 0.0, 1.0, 0.1),)),
+            "parameter knee has no value",
+        ),
+        (_failing(shapes=({"width": 0.5},), apply=_with_a_bug), "fails at width = 0.5"),
         (_named("linear_leak"), "'Wrong' has the name 'linear_leak', which is taken"),
         (_named("flexible_loop"), "taken"),
         (_placed("roof"), "has the place 'roof': use one of machine"),

@@ -14,7 +14,7 @@ from browser import Browser
 from diagnoses_made import BASELINE, CASES, FULL_READING, LEAK, LEAK_CAUSE, NAME, RUN_NEXT, case, page, plain_text
 from looks import look, unfold
 
-from smartshoe.diagnosis import Trace
+from smartshoe.diagnosis import Thresholds, Trace
 from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Statement
 from smartshoe.models.effects import effect
 from smartshoe.models.parameter import Parameter
@@ -22,6 +22,7 @@ from smartshoe.report.diagnosis._page import write_diagnosis_page
 from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
     is_free_form,
+    why_no_name,
 )
 from smartshoe.report.diagnosis.terminal import print_diagnosis
 
@@ -256,6 +257,14 @@ def test_nothing_is_named_where_nothing_was_found() -> None:
     assert why in plain_text(page("unexplained"))
     matters = "no more than small imperfections of a good unit, or faults of the data, add up to"
     assert matters in plain_text(page("adequate"))
+
+
+def test_a_page_says_that_no_name_is_needed_since_much_may_be_borne() -> None:
+    made = replace(case("adequate"), thresholds=Thresholds(material=0.02))
+    assert why_no_name(made) == (
+        "What the simulation leaves is no more than was asked to be borne, 2 % of full scale,"
+        " so that no effect needs a name."
+    )
 
 
 def test_names_and_sentences_from_files_are_escaped(tmp_path: Path) -> None:

@@ -29,6 +29,13 @@ def test_a_block_that_stands_for_a_cause_was_chosen() -> None:
     assert [(bar.name, bar.kind) for bar in ranked(made)] == [(block.name, "cause"), ("delay", "other")]
 
 
+def test_what_stays_in_the_model_without_a_name_is_not_told_as_left_out() -> None:
+    made = replace(case("one cause"), screening=(("warm_up", 9.0), ("delay", 5.0)), minor=("warm_up",))
+    assert [bar.says for bar in ranked(made)] == ["in the extended model, without a name", "not chosen"]
+    named = replace(made.causes[0], equivalents=("warm_up",))
+    assert ranked(replace(made, causes=(named,)))[0].kind == "equivalent"
+
+
 def test_faults_are_drawn_over_the_recording_that_has_them() -> None:
     """The first that was given was left out: it has no trace."""
     (trace, _) = case("one cause").traces

@@ -15,8 +15,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+import numpy as np
+
 from smartshoe.errors import UsageError
-from smartshoe.models.effects.effect import PLACES, Effect
+from smartshoe.models.effects.effect import PLACES, Conditions, Effect, Inverse
 from smartshoe.models.effects.exposure import WORDS, Exposure
 
 GROUP = "smartshoe.effects"
@@ -67,7 +69,29 @@ def _offered(entry: EntryPoint) -> Effect:
             f"{_origin(entry)} is shown by {', '.join(sorted(unknown))}, which is not known:"
             f" use of {', '.join(sorted(WORDS))}"
         )
+    _try(made, _origin(entry))
     return made
+
+
+def _try(made: Effect, origin: str) -> None:
+    """Run an effect of another package once at each of its shapes; raises `UsageError` with what it does wrong."""
+    load = 1.0 - np.abs(np.linspace(-1.0, 1.0, 32))
+    load.flags.writeable = False  # what writes to its input spoils that of others
+    time_s, nothing = np.linspace(0.0, 0.02 * (load.size - 1), load.size), np.zeros(load.size)
+    at = Conditions(time_s, load, 0.02, temperature_k=nothing, neighbour=nothing, relaxing=(0.06, 0.2))
+    for shape in made.shapes:
+        try:
+            for values in (made.start(shape), made.begun(shape)):
+                of = np.shape(made.apply(load, at, values))
+                if of != load.shape:
+                    raise ValueError(f"apply gives values of shape {of} for a signal of shape {load.shape}")
+            undone = made.inverse(made.begun(shape), 0.02)
+            if not isinstance(undone, Inverse | None):
+                raise TypeError(f"inverse gives {undone!r}, which is neither an Inverse nor None")
+        except Exception as error:  # whatever another package does
+            at_shape = "".join(f" at {name} = {value:g}" for name, value in shape.items())
+            why = f"{type(error).__name__}: {error}"
+            raise UsageError(f"{origin} fails{at_shape} ({why}): mend or uninstall the package") from error
 
 
 @cache

@@ -56,6 +56,7 @@ def write_diagnosis_page(
         "numbers": _numbers(diagnosis),
         "gained": sentences.what_was_gained(diagnosis),
         "nothing_left": sentences.nothing_left(diagnosis),
+        "why_no_name": sentences.why_no_name(diagnosis),
         "comparison": sentences.comparison(diagnosis),
         "shares": sentences.shares_text(diagnosis),
         "parts": _parts(diagnosis),

@@ -386,6 +386,15 @@ def nothing_left(diagnosis: Diagnosis) -> str:
     )
 
 
+def why_no_name(diagnosis: Diagnosis) -> str:
+    """Why an adequate simulation needs no cause: by what a good unit has, or by what was asked to count."""
+    decided = diagnosis.thresholds
+    most = "small imperfections of a good unit, or faults of the data, add up to"
+    if decided.material > decided.tolerable:
+        most = f"was asked to be borne, {100.0 * decided.material:g} % of full scale"
+    return f"What the simulation leaves is no more than {most}, so that no effect needs a name."
+
+
 def fault_text(fault: DataFault) -> str:
     """Kind, place, share and what it means."""
     span = (

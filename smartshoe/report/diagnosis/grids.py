@@ -14,12 +14,13 @@ from smartshoe.models.effects import in_words
 from smartshoe.report.diagnosis.views import Map
 from smartshoe.report.numbers import plain
 
-Kind = Literal["cause", "equivalent", "other"]
+Kind = Literal["cause", "equivalent", "minor", "other"]
 
 MOST_BARS, MOST_ALIKE = 12, 10
 ALIKE = 0.95  # of the likeness: beyond it only a full fit can tell two effects apart, if at all
 SAYS: dict[Kind, str] = {
-    "cause": "named as a cause, or stands for one", "equivalent": "cannot be told from a cause", "other": "not chosen",
+    "cause": "named as a cause, or stands for one", "equivalent": "cannot be told from a cause",
+    "minor": "in the extended model, without a name", "other": "not chosen",
 }  # fmt: skip
 
 
@@ -41,13 +42,11 @@ class Bar:
 def ranked(diagnosis: Diagnosis) -> list[Bar]:
     """Effects by what each alone could take off the baseline's error, the strongest first."""
     falls = [(name, fall) for name, fall in diagnosis.screening if np.isfinite(fall) and fall > 0][:MOST_BARS]
-    causes = {cause.name for cause in diagnosis.causes} | {cause.part for cause in diagnosis.causes}
-    alike = {name for cause in diagnosis.causes for name in cause.equivalents}
+    kinds: dict[str | None, Kind] = dict.fromkeys(diagnosis.minor, "minor")
+    kinds |= {name: "equivalent" for cause in diagnosis.causes for name in cause.equivalents}
+    kinds |= {name: "cause" for cause in diagnosis.causes for name in (cause.name, cause.part)}
     most = max((fall for _, fall in falls), default=1.0)
-    return [
-        Bar(name, fall, 100.0 * fall / most, "cause" if name in causes else "equivalent" if name in alike else "other")
-        for name, fall in falls
-    ]
+    return [Bar(name, fall, 100.0 * fall / most, kinds.get(name, "other")) for name, fall in falls]
 
 
 def compared(diagnosis: Diagnosis) -> tuple[list[str], Array] | None:
