@@ -218,7 +218,9 @@ def _lacking(recording: Recording) -> str | None:
     among = f" (columns: {others})" if others else ""
     if not recording.of_role("load"):
         commanded = recording.of_role("command")
-        said = f" ({commanded[0].name} is what was asked for, not what was measured)" if commanded else ""
+        taken = [one.name for one in recording.sensors if one.unit.quantity == "force"]
+        said = f" ({first_names(taken)} is taken as the sensor)" if taken else ""
+        said = f" ({commanded[0].name} is what was asked for, not what was measured)" if commanded else said
         return (
             f"there is no reference load{said}: without it an error of the unit cannot be told from the load; name its"
             f" column with --force{among}"

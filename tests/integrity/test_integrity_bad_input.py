@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import diagnose
 from smartshoe.errors import MissingChannelError
+from smartshoe.files.logs import read
 from smartshoe.integrity import examine
 from smartshoe.recording import Recording
 
@@ -26,6 +29,21 @@ def _recording(**columns: Array) -> Recording:
 def test_a_load_that_is_only_commanded_is_no_reference() -> None:
     found = examine([_recording(command_n=LOAD_N, pressure_mbar=READING)])
     assert "command is what was asked for, not what was measured" in found.refusals[0]
+
+
+def test_a_load_that_is_taken_as_the_sensor_is_told_as_such(tmp_path: Path) -> None:
+    """As by ``--sensor force_n`` of a table that holds the sensor, too."""
+    path = tmp_path / "pressed.csv"
+    np.savetxt(
+        path,
+        np.column_stack([TIME_S, LOAD_N, READING]),
+        "%.4f",
+        ",",
+        header="time_s,force_n,pressure_mbar",
+        comments="",
+    )
+    found = examine([read(path, sensors=["force_n"])])
+    assert "there is no reference load (force is taken as the sensor)" in found.refusals[0]
 
 
 def test_what_is_asked_for_is_chosen_from_the_columns_that_are_there() -> None:
