@@ -28,6 +28,12 @@ os.execv(sys.argv[3], sys.argv[3:])
 """
 
 
+def dumped(page: Path, width: int, height: int) -> str:
+    """The page's elements after it was loaded once by a browser of this size, without a debugger."""
+    words = [str(CHROMIUM), *FLAGS[:3], f"--window-size={width},{height}", "--dump-dom", page.resolve().as_uri()]
+    return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+
+
 class Browser:
     """One page in a browser: ``open`` a file, ``run`` script in it, ``screenshot`` and ``paper``."""
 

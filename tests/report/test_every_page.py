@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from browser import Browser
+from browser import Browser, dumped
 from looks import look, look_of_paper, unfold
 from pages_made import PAGES
 
@@ -25,6 +25,12 @@ def test_nothing_is_clipped_small_faint_broken_or_fetched(browser: Browser, made
     unfold(browser)
     assert browser.run("[...document.querySelectorAll('figure.chart')].every(f => f.querySelector('canvas'))")
     assert look(browser) == []
+
+
+@pytest.mark.browser
+def test_a_browser_that_only_takes_a_picture_shows_the_charts(browser: Browser, made: Path) -> None:
+    """It shows no frame, so that nothing ever comes into sight."""
+    assert "<canvas" in dumped(made, 1200, 6000)
 
 
 @pytest.mark.browser

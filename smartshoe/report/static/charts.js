@@ -306,10 +306,16 @@
   unfold();
 
   const figures = [...document.querySelectorAll("figure.chart")];
+  const EARLY_PX = 400; // before it comes into sight a chart is drawn
   const inSight = new IntersectionObserver((seen) => {
     for (const entry of seen) if (entry.isIntersecting) { draw(entry.target); inSight.unobserve(entry.target); }
-  }, { rootMargin: "400px" });
-  figures.forEach((figure) => inSight.observe(figure));
+  }, { rootMargin: EARLY_PX + "px" });
+  // What is in sight from the beginning is drawn at once: a browser that only takes a picture shows no frame, and so
+  // never tells what comes into sight.
+  figures.forEach((figure) => {
+    if (figure.getBoundingClientRect().top < innerHeight + EARLY_PX) draw(figure);
+    inSight.observe(figure);
+  });
   document.querySelectorAll("details").forEach((details) => details.addEventListener("toggle", () => {
     if (details.open) details.querySelectorAll("figure.chart").forEach((figure) => { inSight.unobserve(figure); inSight.observe(figure); });
   }));
