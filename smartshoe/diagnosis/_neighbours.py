@@ -30,8 +30,9 @@ def with_one_neighbour(
     It is the one that readings of the first ``count``, which are fitted, follow best beside what their loads foretell.
     What foretells a reading to less than the reading's own noise is the same channel once more, and no neighbour.
     """
-    fitted = [(one, mask) for one, mask in zip(recordings[:count], usable, strict=False) if mask.any()]
-    names = list(dict.fromkeys(channel.name for one in recordings for channel in neighbours_of(one)))
+    of_use = [(one, mask) for one, mask in zip(recordings, usable, strict=True) if mask.any()]
+    fitted = of_use[: sum(bool(mask.any()) for mask in usable[:count])]
+    names = list(dict.fromkeys(channel.name for one, _ in of_use for channel in neighbours_of(one)))
     if not names:
         return [*recordings], []
     shared = [n for n in names if all(n in [c.name for c in neighbours_of(one)] for one, _ in fitted)]

@@ -46,6 +46,7 @@ def test_a_filter_that_is_worse_than_a_static_line_says_so_once(units: list[Unit
     assert "worse than a static line" in against_static(overall)
     worse = replace(units[0], validation=replace(units[0].validation, overall=overall))
     assert judge(worse).grade == "bad"
+    assert judge(worse).does == "use a static gain meanwhile, and diagnose it"
     text = write_page(tmp_path / "report.html", "t", "", {}, [worse]).read_text(encoding="utf-8")
     assert text.count("The filter is worse than a static line") == 1
     text = write_page(tmp_path / "report.html", "t", "", {}, [units[0]]).read_text(encoding="utf-8")
@@ -63,6 +64,11 @@ def test_what_the_extended_model_leaves_stands_beside_what_the_filter_leaves(
     diagnosed = replace(units[1], diagnosis=DiagnosisLink("friction", "diagnosis/left_heel/diagnosis.html", 0.546))
     text = write_page(tmp_path / "report.html", "t", "", {}, [diagnosed]).read_text(encoding="utf-8")
     assert text.count("0.546 N") >= 2
+    assert judge(diagnosed).does == "use its extended calibration, which leaves 0.546 N, and see its diagnosis"
+    overall = units[1].validation.overall
+    for left_n in (None, 1.001 * min(overall.rmse_static_n, overall.rmse_compensated_n)):
+        no_better = replace(units[1], diagnosis=DiagnosisLink("friction", "diagnosis.html", left_n))
+        assert judge(no_better).does == "see its diagnosis"
 
 
 def test_the_page_is_well_formed_escaped_and_loads_nothing(page: Path) -> None:

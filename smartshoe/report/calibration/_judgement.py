@@ -73,13 +73,15 @@ def judge(unit: UnitReport) -> Judgement:
     left = f"{plain(overall.rmse_compensated_n)} N left ({plain(share, 2)} % of full scale)"
     if set(unit.judged) <= set(unit.fitted):
         left += " on the very data that was fitted"
-    look_into = "see its diagnosis" if unit.diagnosis else "diagnose it"
+    look_into = _look_into(unit)
     if not unit.identification["converged"]:
         return Judgement(
             unit.name, "bad", "the fit did not converge", "record more rates and loads, then identify again"
         )
     if gain is not None and gain <= -0.5:
-        return Judgement(unit.name, "bad", against_static(overall), f"use a static gain meanwhile, and {look_into}")
+        return Judgement(
+            unit.name, "bad", against_static(overall), _look_into(unit, "use a static gain meanwhile, and ")
+        )
     if share > BAD_PERCENT:
         return Judgement(unit.name, "bad", left, look_into)
     if looks_like_friction(unit.validation.rates):
@@ -92,6 +94,16 @@ def judge(unit: UnitReport) -> Judgement:
     if gain is not None and gain < WORTH_PERCENT:
         return Judgement(unit.name, "good", f"{left}; {against_static(overall)}", "a static gain would do as well")
     return Judgement(unit.name, "good", left)
+
+
+def _look_into(unit: UnitReport, meanwhile: str = "") -> str:
+    """To diagnose it, and what to do ``meanwhile``; where that was done, to use what its diagnosis is good for."""
+    if unit.diagnosis is None:
+        return f"{meanwhile}diagnose it"
+    overall, left_n = unit.validation.overall, unit.diagnosis.extended_force_rmse_n
+    if left_n is not None and left_n < min(overall.rmse_compensated_n, overall.rmse_static_n):
+        meanwhile = f"use its extended calibration, which leaves {plain(left_n)} N, and "
+    return f"{meanwhile}see its diagnosis"
 
 
 def headline(judgements: Sequence[Judgement]) -> tuple[Grade, str]:
