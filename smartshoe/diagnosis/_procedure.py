@@ -262,7 +262,8 @@ def _nearest(found: Inference) -> tuple[Rival, ...]:
 def _zeros(found: Inference, given: Prepared, left: float, noise: GaussMarkov | None) -> list[Zero]:
     """The offsets and tares that are seen beside what was ``found``, and are material."""
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
-    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, noise)
+    rubbed = math.hypot(*(one.size for one in found.members if one.effect.never_fades))
+    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, noise, rubbed)
     return [one for one in zeros if one.size >= given.thresholds.material]
 
 

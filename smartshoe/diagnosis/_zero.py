@@ -170,10 +170,12 @@ def zeros_of(
     remembered: float,
     thresholds: Thresholds,
     noise: GaussMarkov | None = None,
+    rubbed: float = 0.0,
 ) -> tuple[Zero, ...]:
     """What is named of the zeros, largest first; ``left``: rms of the structure that the model does not explain.
 
     Such structure may lie at rest as anywhere. ``remembered``: size of the effects with a memory of the wall.
+    ``rubbed``: of those whose memory does not fade, so that a unit that begins loaded may stand anywhere within it.
     ``noise``: what is left that remembers; where it is noise, a rest holds it as any other stretch does.
     """
     if scale.unit.quantity != "pressure":
@@ -181,7 +183,7 @@ def zeros_of(
     rests = first_rests(sessions, model, thresholds)
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size:
-        return _unseen(sessions, model, left, remembered, thresholds)
+        return _unseen(sessions, model, left, remembered, thresholds, rubbed)
     loads, readings, drifted = rests.T
     sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
@@ -223,14 +225,19 @@ def creeping(zeros: Sequence[Zero], drift: Effect, size: float, thresholds: Thre
 
 
 def _unseen(
-    sessions: Sequence[Session], model: ExtendedModel, left: float, remembered: float, thresholds: Thresholds
+    sessions: Sequence[Session],
+    model: ExtendedModel,
+    left: float,
+    remembered: float,
+    thresholds: Thresholds,
+    rubbed: float = 0.0,
 ) -> tuple[Zero, ...]:
     """The zero of a unit that is never seen unloaded at first: by its model, and an offset or a tare may be it."""
     found = offsets(sessions, model)
     fitted = fitted_of(sessions)
     # What each remembers of an unknown past, beyond what its one arm does; drifts; the curve below its lowest load.
     begun = np.array([abs(one.conditions.load[0]) for one in fitted])
-    past = begun * (thresholds.departure * abs(model.relaxing_share) + remembered)
+    past = begun * (thresholds.departure * abs(model.relaxing_share) + remembered) + rubbed
     drifted = thresholds.departure * np.array([np.ptp(_drifted(one, model)) for one in fitted])
     lowest = np.array([np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01) for one in fitted])
     own = np.hypot(thresholds.zero_sd, drifted)

@@ -55,10 +55,11 @@ def _sessions(*runs: Recording) -> tuple[list[Session], Scale]:
     return prepare(runs, usable, [False] * len(runs), scale, [1], STANDARD), scale
 
 
-def _zeros(*runs: Recording, left: float = 0.0, remembered: float = 0.0) -> dict[str, Zero]:
+def _zeros(*runs: Recording, left: float = 0.0, remembered: float = 0.0, rubbed: float = 0.0) -> dict[str, Zero]:
     sessions, scale = _sessions(*runs)
     model = baseline_of(sessions, scale)
-    return {one.effect.name: one for one in zeros_of(sessions, model, scale, left, remembered, STANDARD)}
+    found = zeros_of(sessions, model, scale, left, remembered, STANDARD, rubbed=rubbed)
+    return {one.effect.name: one for one in found}
 
 
 # -- zeros ------------------------------------------------------------------------------------------------------
@@ -119,6 +120,9 @@ def test_a_unit_that_is_never_unloaded_leaves_open_which_zero_it_is() -> None:
         0.1, rel=0.05
     )  # so that it is no cause
     known = found["zero_offset"].sd
+    # What a loop holds does not fade, however little it begins with.
+    rubbed = _zeros(*runs, rubbed=0.05)["zero_offset"]
+    assert (rubbed.led_from, rubbed.sd) == (pytest.approx(0.1, rel=0.05), pytest.approx(np.hypot(known, 0.05), rel=0.1))
     assert _zeros(*runs, left=0.01)["zero_offset"].sd == pytest.approx(np.hypot(known, 0.01), rel=0.05)
     assert _zeros(*runs, remembered=0.1)["zero_offset"].sd > known
 

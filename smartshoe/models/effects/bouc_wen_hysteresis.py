@@ -27,7 +27,7 @@ class BoucWenHysteresis(Remembering):
 
     name, family, stage, place = "bouc_wen_hysteresis", "hysteresis", "wall", "wall"
     is_steep_undone = True
-    mechanism = "friction"
+    mechanism, never_fades = "friction", True
     says = "the reading lies lower while loading than while unloading, at any rate, and friction is there at any load"
     parameters = (
         EffectParameter("half_height", "FS_load", "friction of a long slide without load", 0.0, 0.0, 0.4, 0.01),

@@ -196,6 +196,7 @@ class Effect(ABC):
     ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
     ``branch``: which of its family's, where that has several that may be there together and be told for one another.
+    ``never_fades``: True where what past loads left behind stays as it is until the next ones, as friction does.
     ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
     """
 
@@ -222,6 +223,7 @@ class Effect(ABC):
     bends_beside_arm: ClassVar[bool] = False
     imitates: ClassVar[str] = ""
     branch: ClassVar[str] = ""
+    never_fades: ClassVar[bool] = False
     mechanism: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
     is_steep_undone: ClassVar[bool] = False

@@ -52,7 +52,7 @@ class FlexibleLoop(Effect):
         *_weights("growing", "the logarithmic scale of load", USUAL_HEIGHT / ((1.0 + LEAST_LOAD) * SCALE)),
     )
     exposed_by = by("rates", "peaks", "minor_loops")
-    is_flexible = True
+    is_flexible = never_fades = True
     is_refinement = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

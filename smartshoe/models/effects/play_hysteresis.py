@@ -31,7 +31,7 @@ class PlayHysteresis(Effect):
     """
 
     name, family, stage, place = "play_hysteresis", "hysteresis", "wall", "wall"
-    mechanism = "friction"
+    mechanism, never_fades = "friction", True
     says = "the reading lies lower while loading than while unloading, by the same amount at any rate"
     parameters = (
         EffectParameter("half_height", "FS_load", "half of the major loop's greatest height", 0.0, 0.0, 0.4, 0.01),
