@@ -10,8 +10,8 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.kernels.linear_filter import linear_filter
 from smartshoe.recording import Channel, Recording
+from smartshoe.signals.lags import lagged
 from smartshoe.signals.masks import bridged
 
 
@@ -68,8 +68,7 @@ def _beside(recording: Recording, neighbour: Channel, usable: Mask, thresholds: 
     if not mask.any():
         return _Beside(0.0, 0.0, False)
     force = bridged(recording.time_s, load.values, load.present)
-    falls = (float(np.exp(-recording.sample_time_s / tau)) for tau in thresholds.memory_s)
-    behind = [linear_filter([1.0 - fall], [1.0, -fall], force)[0] for fall in falls]
+    behind = [lagged(force, recording.sample_time_s, tau_s) for tau_s in thresholds.memory_s]
     foretold = np.column_stack([np.ones(force.size), force, force**2, *behind])[mask]
     reading, other = sensor.values[mask], neighbour.in_unit(sensor.unit)[mask]
     as_well = np.column_stack([np.ones(other.size), other])
