@@ -48,25 +48,15 @@ class Cycle:
 
 
 def turning_points(load_n: Array, threshold_n: float) -> list[int]:
-    """Samples at which the load turns by more than ``threshold_n`` (a zig-zag that noise does not trip)."""
-    points = [0]
-    low = high = 0
-    direction = 0
-    loads = load_n.tolist()  # plain numbers: a pass over an array's own costs eight times as much
-    lowest = highest = loads[0] if loads else 0.0
-    for k, load in enumerate(loads):
-        if load > highest:
-            high, highest = k, load
-        if load < lowest:
-            low, lowest = k, load
-        if direction >= 0 and highest - load > threshold_n:
-            points.append(high)
-            direction, low, high, lowest, highest = -1, k, k, load, load
-        elif direction <= 0 and load - lowest > threshold_n:
-            points.append(low)
-            direction, low, high, lowest, highest = 1, k, k, load, load
-    points.append(load_n.size - 1)
-    return points
+    """Samples at which the load (n,) turns by more than ``threshold_n`` (a zig-zag that noise does not trip).
+
+    The first sample and the last are among them.
+    """
+    from smartshoe.kernels.turning import turning_points as run
+
+    points = np.empty(load_n.size + 1, dtype=np.intp)
+    found = run(np.ascontiguousarray(load_n, dtype=float), threshold_n, points) if load_n.size else 0
+    return [*points[:found].tolist(), load_n.size - 1]
 
 
 def rises_of(load_n: Array, threshold_n: float) -> list[tuple[int, int]]:
