@@ -49,8 +49,8 @@ class Unit:
 
 _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("s", "s", "time", 1.0, 0.0, ("sec", "secs", "second", "seconds", "sek", "sekunden", "秒")),
-    ("ms", "ms", "time", 1e-3, 0.0, ("msec", "millisecond", "milliseconds", "毫秒")),
-    ("us", "us", "time", 1e-6, 0.0, ("µs", "usec")),
+    ("ms", "ms", "time", 1e-3, 0.0, ("msec", "millis", "millisecond", "milliseconds", "毫秒")),
+    ("us", "us", "time", 1e-6, 0.0, ("µs", "usec", "micros")),
     ("min", "min", "time", 60.0, 0.0, ("minute", "minutes", "分")),
     ("h", "h", "time", 3600.0, 0.0, ("hour", "hours")),
     ("N", "n", "force", 1.0, 0.0, ("newton", "newtons", "牛", "牛顿")),
@@ -122,6 +122,7 @@ for _symbol, _suffix, _quantity, _scale, _offset, _words in _TABLE:
     for _word in _words:
         _BY_WORD.setdefault(unicodedata.normalize("NFKC", _word).casefold(), _unit)
 _BY_SUFFIX["kg"] = _BY_SUFFIX["kgf"]  # as of a header's "(kg)": nothing here has a mass
+_BY_SUFFIX |= {word: unit for word, unit in _BY_WORD.items() if unit.quantity == "time"}  # timestamp_seconds
 
 
 def find_unit(text: str) -> Unit | None:
@@ -146,8 +147,8 @@ def on_one_cm2(pressure: Unit) -> Unit:
 
 
 def unit_of_suffix(suffix: str) -> Unit | None:
-    """The unit of a column's ending, as in ``pressure_mbar``; None where it is none."""
-    return _BY_SUFFIX.get(suffix.casefold())
+    """The unit of a column's ending, as in ``pressure_mbar`` or ``load_mN``; None where it is none."""
+    return _BY_SUFFIX.get(suffix.casefold()) or _BY_SYMBOL.get(suffix)
 
 
 def declared(symbol: str) -> Unit:

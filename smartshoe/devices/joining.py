@@ -25,6 +25,7 @@ COPY_CLOSER = 0.5  # a copy of the load is closer to it than the reading is; ano
 ITERATIONS = 8
 LARGEST_MISFIT = 1.5
 LONGEST_BRIDGED_STEPS = 3.5
+RARE_RATE = 0.01  # that a clock differs by from another: quartz by a ten-thousandth, a processor's own by a hundredth
 Ticks = Literal["logger", "machine"]
 
 
@@ -177,6 +178,8 @@ def join_with_clocks(
         )
     at = found.machine_time(logger_log.time_s)
     machine_s = machine_log.time_s
+    if np.array_equal(machine_s, logger_log.time_s) or abs(found.rate) > RARE_RATE:
+        caveat += "; if one clock wrote both logs, put their columns into one file"
     if ticks == "logger":
         inside = (at >= machine_s[0]) & (at <= machine_s[-1])
         time_s, on_machine_s = logger_log.time_s[inside], at[inside]

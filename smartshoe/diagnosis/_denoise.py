@@ -16,6 +16,7 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import robust_sd
 
 LATER = 9  # samples within which a reading is seen to follow, a resolution
+PLACES_PER_TAP = 3  # with as many, unrelated noise is never followed by nearly all
 FEW_TAPS = 300  # of a window: with more, blocks in the frequency domain take less time than sums
 
 
@@ -43,12 +44,12 @@ def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float
     differences without the largest; 0 where it is not nearly all (``same``), or where too few are left to tell.
     """
     moved, read = np.diff(load, 3), np.diff(reading, 3)
-    if moved.size < thresholds.least_samples:
+    if moved.size <= LATER:
         return 0.0
     at = np.arange(LATER, moved.size)
     inside = _are_of_noise(moved, thresholds)
     at = at[np.lib.stride_tricks.sliding_window_view(inside, LATER + 1).all(axis=1)]
-    if at.size < thresholds.least_samples:
+    if at.size < PLACES_PER_TAP * (LATER + 1):
         return 0.0
     taps = np.stack([moved[at - late] for late in range(LATER + 1)])
     gram, cross, whole = taps @ taps.T, taps @ read[at], float(read[at] @ read[at])

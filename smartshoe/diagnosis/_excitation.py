@@ -130,7 +130,7 @@ class _Rise(NamedTuple):
     """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at.
 
     Where the load's window is longer than two samples, it counts those that it tells apart. ``is_rated``: of so many
-    samples that one more makes no other rate.
+    samples that one more makes no other rate. ``is_cut``: it ends with the recording, before the load fell.
     """
 
     rate: float
@@ -138,6 +138,7 @@ class _Rise(NamedTuple):
     peak: float
     is_minor: bool
     is_rated: bool = True
+    is_cut: bool = False
 
 
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
@@ -152,7 +153,8 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
         is_rated = samples * thresholds.same >= 1.0 or session.thinned > 1  # else one sample makes another rate of it
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
         above = float(load[first]) - lowest > thresholds.clear * thresholds.cycle * span
-        yield _Rise(rate, samples * _windows(session), float(load[last]), above, is_rated)
+        is_cut = last + 1 == load.size
+        yield _Rise(rate, samples * _windows(session), float(load[last]), above, is_rated, is_cut)
 
 
 def _windows(session: Session) -> float:
@@ -164,7 +166,7 @@ def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bo
     """Whether peak loads of ``each`` recording's rises do not all go with the clock, which begins anew in each."""
     trends = []
     for rises in each:
-        peaks = np.array([rise.peak for rise in rises])
+        peaks = np.array([rise.peak for rise in rises if not rise.is_cut])
         if peaks.size > 1:
             varies = np.ptp(peaks) > thresholds.same * np.max(peaks)
             trends.append(abs(float(np.corrcoef(np.arange(peaks.size), peaks)[0, 1])) if varies else 0.0)

@@ -166,6 +166,11 @@ class Gain:
         square = self.rmse_before**2 - self.rmse_after**2
         return math.sqrt(square) / abs(scale.reading) if self.is_certain and square > 0.0 else 0.0
 
+    def growth(self, scale: Scale) -> float:
+        """Rms, a share of full scale, by which the error grows, certain or not; 0 where it does not."""
+        square = self.rmse_after**2 - self.rmse_before**2
+        return math.sqrt(square) / abs(scale.reading) if square > 0.0 else 0.0
+
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
         return {

@@ -48,19 +48,24 @@ def names_of(
     * Where some are sure: these. Beside them, where one of the sure has a law, others above ``tolerable`` that are
       likelier there than not (another effect's shadow is seldom so large), or that cannot be ruled out and are larger
       than what the laws of the sure ones usually depart by.
-    * Where none is sure: those that cannot be ruled out and are larger than all that is left; else the one of the kind
-      that does most ``alone``. Each is half sure at most.
+    * Where none is sure: those that cannot be ruled out and are larger than all that is left; else the one of
+      the kind that does most ``alone``, if it cannot be ruled out. Each is half sure at most.
 
     ``is_clocked``: peak loads grow or fall with time, so that effects that go with it imitate each other, and curves:
     these are half sure at most. ``is_unsteady``: zeros change at moments, of which some may not be seen and may imitate
     any effect: all are half sure at most. A flexible block, and a curve that lies where its kind ends, is named by the
-    law that comes nearest.
+    law that comes nearest; no name is told twice.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     likely = [_with_untold(name, thresholds) for name in likely]
     likely = [
         _doubted(name) if is_unsteady or (is_clocked and name.effect.goes_with_the_clock) else name for name in likely
     ]
+    # Beside a law a block of which it is the nearest is what that law departs by: one name.
+    first: dict[str, Name] = {}
+    for one in sorted(likely, key=lambda one: (one.is_sure, one.member.size), reverse=True):
+        first.setdefault(one.effect.name, one)
+    likely = [one for one in likely if first[one.effect.name] is one]
     found = {one.effect.name for one in likely}  # what is there itself stands for no other
     likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
     odds = thresholds.equivalent_odds
@@ -75,7 +80,7 @@ def names_of(
         return tuple(_doubted(one) for one in larger)
     if alone is None:
         return ()
-    by_itself = (one for one in likely if one.member.effect.kind == alone.kind)
+    by_itself = (one for one in possible if one.member.effect.kind == alone.kind)
     return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
 
 

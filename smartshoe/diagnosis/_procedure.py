@@ -210,9 +210,8 @@ def _outcome(
     least = max(thresholds.tolerable, thresholds.material, known)
     gained = 0.0 if causes else won.certain_fall(given.scale)
     besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
-    verdict = verdict_of(
-        causes, left.before, left.after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides
-    )
+    worse = won.is_loss or won.growth(given.scale) > thresholds.tolerable
+    verdict = verdict_of(causes, left.before, left.after, thresholds, follows, known, worse=worse, elsewhere=besides)
     return _Outcome(verdict, won, elsewhere, unproven)
 
 

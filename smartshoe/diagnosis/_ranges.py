@@ -14,6 +14,8 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.exposure import LATER_CYCLES, SAYS
 
+GROUPS = 100  # of samples of like loads, at most: a resolution
+
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
@@ -62,6 +64,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             " reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load it"
             " over its range)"
         )
+    said += _flat_above(kept, scale, thresholds)
     said += _foreign([(one.recording.name, gain) for one, gain in zip(fitted, within, strict=True)], thresholds)
     said += _unlike(fitted, thresholds)
     between = _between(kept, thresholds.same)
@@ -77,6 +80,27 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 " zero of reading or load is another in each file, or the files are not of one unit"
             )
     return Ranges(tuple(said), trap)
+
+
+def _flat_above(kept: Sequence[tuple[Array, Array]], scale: Scale, thresholds: Thresholds) -> list[str]:
+    """What is said of a reading that stands still over the upper loads: a stop, on which noise or sums move it.
+
+    Of the recording that reaches highest: medians of the reading over the upper quarter (`same`) of its loads, or more,
+    differ from the last by less than `standing` of its span.
+    """
+    load, reading = max(kept, key=lambda one: float(one[0].max()))
+    order = np.argsort(load)
+    groups = np.array_split(order, max(1, min(order.size // thresholds.few, GROUPS)))
+    levels = np.array([float(np.median(reading[group])) for group in groups])
+    moves = np.abs(levels - levels[-1]) >= thresholds.standing * float(np.ptp(reading))
+    first = int(np.flatnonzero(moves)[-1]) + 1 if moves.any() else 0
+    begins = float(np.median(load[groups[first]]))
+    if float(load.max()) - begins < thresholds.same * float(np.ptp(load)) or first + 1 >= len(groups):
+        return []
+    return [
+        f"above {_told(begins * scale.load_n)} N the reading stands still, to {100.0 * thresholds.standing:g} % of its"
+        " span: no force can be told there, and none that is compensated is to be believed"
+    ]
 
 
 def _foreign(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -124,9 +125,11 @@ def worst_place(sessions: Sequence[Session], residuals: Sequence[Array], thresho
     own = power[numbers == worst]
     parts = min(10, own.size)
     at = int(np.argmax([float(part.mean()) for part in np.array_split(own, parts)]))
-    begin_s, duration_s = sessions[worst].recording.time_s[0], sessions[worst].conditions.time_s[-1]
+    part_s = float(sessions[worst].conditions.time_s[-1]) / parts
+    begin_s = float(sessions[worst].recording.time_s[0]) + at * part_s
+    digits = math.ceil(-math.log10(part_s)) if 0.0 < part_s < 1.0 else 0
     return (
         f"{100 * table[d, k] / total:.0f} % of the power that is left lies at {25 * k}-{25 * (k + 1)} % of full load"
         f" {doing} ({100 * share[d, k]:.0f} % of the samples); the worst stretch is {sessions[worst].recording.name},"
-        f" {begin_s + at * duration_s / parts:.0f}-{begin_s + (at + 1) * duration_s / parts:.0f} s"
+        f" {begin_s:.{digits}f}-{begin_s + part_s:.{digits}f} s"
     )

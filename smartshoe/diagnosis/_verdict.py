@@ -44,7 +44,8 @@ def verdict_of(
 ) -> Verdict:
     """What is left, against what was wrong ``before`` and what is tolerable.
 
-    ``worse``: that the extension is so, for certain, on what is held out: whatever it follows, it explains a part.
+    ``worse``: that the extension is so on what is held out, for certain or by more than what is tolerable: whatever it
+    follows, it explains a part.
     ``elsewhere``: `off_elsewhere`, or what an effect moves that is followed, but of no kind that has a name, or what
     effects without names do away with.
 

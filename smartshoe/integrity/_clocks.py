@@ -72,6 +72,10 @@ def align(view: View) -> tuple[View, Lags]:
         turned = view.turned()
         over = _followed(turned)
         far = view.thresholds.clear * (1.0 - _closeness(over)) < 1.0 - _closeness(followed)
+        if far and over is not None and followed is not None and over.smooth_s > followed.smooth_s:
+            # Smoothed by much, any presses are sines, which follow one another either way.
+            alike = _followed(view, (over.smooth_s / view.thresholds.echo_s,))
+            far = view.thresholds.clear * (1.0 - _closeness(over)) < 1.0 - _closeness(alike)
         if _follows(over, view.thresholds) and (is_open or far):
             view, followed = turned, over
     if followed is None:
@@ -153,8 +157,8 @@ class _Followed:
     weights: Array
 
 
-def _followed(view: View) -> _Followed | None:
-    """How late the reading follows, or None where nothing can tell."""
+def _followed(view: View, smoothing: Sequence[float] = SMOOTHING) -> _Followed | None:
+    """How late the reading follows, or None where nothing can tell; ``smoothing`` in echoes, the least that does."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
     if duration_s < given.hold_s:
@@ -166,7 +170,7 @@ def _followed(view: View) -> _Followed | None:
     reading = binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
-    for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
+    for echoes in smoothing:  # as little as the noise allows, since smoothing blunts the edges
         found = _by_windows(grid, load, reading, width_s, echoes * given.echo_s, given)
         if _follows(found, given):
             break
@@ -350,16 +354,15 @@ def _peak(correlation: Array, thresholds: Thresholds) -> int | None:
     """The place, among lags about zero, at which a reading follows; None where it does beyond the longest of them.
 
     Of an even load each period is a peak: the nearest to zero that no other exceeds far. By as little as the square of
-    what counts as standing still none does: a gain that drifts makes of two periods the later one the closer.
+    what counts as standing still none does: a gain that drifts makes of two periods the later one the closer. Nor does
+    what is at the longest lag by what counts as standing still: a period may be as long.
     """
-    best = int(np.argmax(correlation))
-    if best in (0, correlation.size - 1):
-        return None
     inner = correlation[1:-1]
     is_peak = (inner >= correlation[:-2]) & (inner >= correlation[2:])
-    missed = max(1.0 - float(correlation[best]), thresholds.standing**2)
+    is_inside = 0 < int(np.argmax(correlation)) < correlation.size - 1
+    missed = max(1.0 - float(np.max(correlation)), thresholds.standing ** (2 if is_inside else 1))
     peaks = np.flatnonzero(is_peak & (thresholds.clear * missed >= 1.0 - inner)) + 1
-    return int(peaks[np.argmin(np.abs(peaks - correlation.size // 2))])
+    return int(peaks[np.argmin(np.abs(peaks - correlation.size // 2))]) if peaks.size else None
 
 
 def _beside_its_sample(values: Array, best: int) -> float:

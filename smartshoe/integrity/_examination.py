@@ -174,9 +174,10 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
     """What was found in one recording; ``turned``: its reading rises where it seems to fall."""
     recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
-    findings = list(short_recording(recording, thresholds))
-    if findings:
-        return _Examined(findings, ~usable)
+    is_rest = any(one.kind in ("interpolated", "held_samples") for one in tame.findings)
+    short = list(short_recording(recording, thresholds, is_rest))
+    if short:
+        return _Examined([*tame.findings, *short], ~usable)
     findings = [*tame.findings, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
     for finding in findings:
         if finding.masks:

@@ -37,6 +37,11 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
             f" curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed; is this the unit that was"
             " pressed?"
         )
+        if share >= follows:
+            says = (
+                f"the reading does not move with the load, though what is slow in it explains {100 * share:.0f} % of"
+                " its variance: were both recorded by one clock, and is this the unit that was pressed?"
+            )
         if _is_noise(view):
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
     yield Finding.fatal("does_not_follow_load", whole, says)

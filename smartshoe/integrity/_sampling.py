@@ -15,8 +15,11 @@ from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import robust_sd
 
 
-def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
-    """Kind ``short_recording``: fatal, since so little shows nothing, nor what is over before a reading answers."""
+def short_recording(recording: Recording, thresholds: Thresholds, is_rest: bool = False) -> Iterator[Finding]:
+    """Kind ``short_recording``: fatal, since so little shows nothing, nor what is over before a reading answers.
+
+    ``is_rest``: samples were left out, of which other findings tell.
+    """
     held = f"{len(recording)} samples in {moment(recording.duration_s, 3)} s" if len(recording) > 1 else "one sample"
     if len(recording) < thresholds.least_samples:
         mend = f"give at least {thresholds.least_samples} samples"
@@ -27,7 +30,8 @@ def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
         )
     else:
         return
-    says = f"the recording holds {held}: {mend}"
+    rest = ", without those that are no measurements of their own" if is_rest else ""
+    says = f"the recording holds {held}{rest}: {mend}"
     yield Finding.fatal("short_recording", np.ones(len(recording), dtype=bool), says)
 
 

@@ -52,7 +52,8 @@ def _together(channels: Sequence[Channel], wild: Mapping[str, Mask]) -> Mask:
 def _wild(channel: Channel, thresholds: Thresholds) -> Mask:
     """(n,) True at a few values that leap beyond nearly all others by ten times their span, and back.
 
-    For a few samples at a time, or for longer where they are one number, which stands for nothing.
+    For a few samples at a time, or for longer where they are one number, which stands for nothing. Several with which
+    the recording begins or ends leapt from nowhere: a ramp that it caught the end of, unless they are one number.
     """
     wild = np.zeros(channel.values.size, dtype=bool)
     values = channel.values[channel.present]
@@ -66,9 +67,10 @@ def _wild(channel: Channel, thresholds: Thresholds) -> Mask:
     leap = np.abs(np.diff(beyond, prepend=0.0, append=0.0))  # into each sample, and out of the last
     for first, last in zip(*runs_of(far), strict=True):
         run = channel.values[first:last]
-        is_short = last - first <= thresholds.few or np.ptp(run) == 0.0
+        if np.ptp(run) > 0.0 and (last - first > thresholds.few or first == 0 or last == far.size):
+            continue
         leaps = (leap[first] > 0.5 * abs(beyond[first]), leap[last] > 0.5 * abs(beyond[last - 1]))
-        wild[first:last] = is_short and all(leaps)
+        wild[first:last] = all(leaps)
     return wild
 
 

@@ -17,6 +17,11 @@ def plain(value: float | None, digits: int = 3) -> str:
     return f"{value:.{decimals}f}" if decimals <= 6 else f"{value:.{digits}g}"
 
 
+def with_unit(number: str, unit: str) -> str:
+    """A number and its unit; of a reading without one the number alone."""
+    return number if unit == "1" else f"{number} {unit}"
+
+
 def with_sd(parameter: Mapping[str, Any]) -> str:
     """``value ± sd``, both to the sd's two leading digits."""
     value, sd = parameter.get("value"), parameter.get("sd")

@@ -120,6 +120,16 @@ def test_a_smooth_load_without_corners_is_joined_all_the_same() -> None:
     assert float(join(machine, sensor).metadata["join_delay_s"]) == pytest.approx(-0.5, abs=0.2)
 
 
+@pytest.mark.parametrize(("rate", "later_s", "is_doubted"), [(0.0, 0.0, True), (0.015, 0.5, True), (0.0, 0.5, False)])
+def test_two_logs_that_one_clock_may_have_written_say_so(rate: float, later_s: float, is_doubted: bool) -> None:
+    """They hold the same times, or clocks that differ by more than clocks do."""
+    machine, _ = _logs(0.0, 0.0, 0.3, 6)
+    time_s = machine.time_s + later_s
+    load = PROTOCOL.load_at(time_s * (1.0 + rate))
+    logger = Recording.from_arrays(time_s=time_s, load_v=load / 200.0, pressure_v=0.5 + load / 400.0)
+    assert ("if one clock wrote both logs" in join(machine, logger).notes[-1]) == is_doubted
+
+
 @pytest.mark.parametrize(
     ("delay_s", "rate", "words"),
     [(0.35, 2e-4, "0.3500 ± 0.0010 s ahead, 200.0 ± 3.0 ppm fast"),

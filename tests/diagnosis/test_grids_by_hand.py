@@ -163,7 +163,9 @@ def test_what_a_reading_follows_is_no_noise_of_its_load(late: int) -> None:
     assert noise_sd(shaken, STANDARD) > 0.09
     for other, share in ((rng.standard_normal(4000), 0.0), (shaken + 0.3 * rng.standard_normal(4000), 0.0)):
         assert followed_share(shaken, other, STANDARD) == share  # none of it, or not nearly all
-    assert followed_share(shaken[:90], reading[:90], STANDARD) == 0.0
+    # Too few places to tell: each has nine before it, of which none is a corner's.
+    assert followed_share(shaken[:40], reading[:40], STANDARD) == 0.0
+    assert followed_share(shaken[:8], reading[:8], STANDARD) == 0.0
     assert followed_share(shaken, np.ones(4000), STANDARD) == 0.0
 
 

@@ -193,6 +193,17 @@ def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_
     assert names_of([curve, other], left, STANDARD, alone=effect("linear_leak")) == ()
     small = replace(curve, size=STANDARD.tolerable)
     assert names_of([small, other], left, STANDARD, alone=effect("contact_area")) == ()
+    ruled_out = replace(curve, departed=30.0)  # whose odds are those of no equivalent
+    assert names_of([ruled_out, other], left, STANDARD, alone=effect("saturation")) == ()
+
+
+def test_a_block_beside_the_law_that_is_its_nearest_is_that_laws_departure_and_no_second_name() -> None:
+    (block, *_) = blocks()["static_curve"]
+    law = member("contact_area", size=0.01)
+    beside = member(block, size=0.02, laws=(("contact_area", 1.0), ("dead_band", 90.0)))
+    name = only(names_of([beside, law], 0.0, STANDARD))
+    assert name.effect.name == "contact_area"
+    assert name.member is beside  # the larger, of two that are sure
 
 
 def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_well() -> None:

@@ -198,3 +198,24 @@ def test_what_held_out_loads_do_that_fitted_ones_lack_is_said() -> None:
         "what was fitted lacks loads held for some seconds, at several levels, rests without load between loads"
     )
     assert told(resting, pressed) is None
+
+
+@pytest.mark.parametrize(("stops_at", "is_told"), [(0.5, True), (0.7, True), (0.8, False), (1.0, False)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_reading_that_stands_still_over_a_quarter_of_the_loads_or_more_is_told(
+    stops_at: float, is_told: bool, sign: float
+) -> None:
+    """On a stop it wanders by a little, so that it is no rail of equal numbers."""
+    load, _ = _proportional(0.0, 800.0)
+    wander = 0.5 * np.random.default_rng(1).standard_normal(load.size)
+    said = _ranges((load, sign * (GAIN_MBAR_PER_N * np.minimum(load, 800.0 * stops_at) + wander))).says
+    told = [one for one in said if "stands still" in one]
+    assert bool(told) is is_told
+    if told:
+        begins_n = float(told[0].split()[1])
+        assert begins_n == pytest.approx(800.0 * stops_at, abs=30.0)
+
+
+def test_a_reading_that_bends_does_not_stand_still() -> None:
+    load, _ = _proportional(0.0, 800.0)
+    assert _ranges((load, 7.0 * np.sqrt(load))) == Ranges()

@@ -46,6 +46,16 @@ def test_a_diagnosis_bears_a_recording_of_any_length(count: int, is_held_out: bo
     assert left_out or count >= STANDARD.least_samples
 
 
+@pytest.mark.parametrize("count", [104, 112, 160])
+def test_a_reading_that_copies_a_load_of_many_corners_is_good_to_rounding(count: int) -> None:
+    """A brake's torque, reckoned from the weight: the load is no noisier than its reading follows."""
+    load = np.abs(np.cumsum(np.random.default_rng(3).standard_normal(count)))
+    copied = Recording.from_arrays(time_s=0.02 * np.arange(count), force_n=load, pressure_mbar=0.127 * load)
+    found = diagnose(copied)
+    assert found.verdict == "adequate"
+    assert found.baseline.fit_percent > 99.99
+
+
 @pytest.mark.parametrize("count", [2, 3, 5, 30])
 def test_a_window_is_no_longer_than_what_it_averages(count: int) -> None:
     run = _pressed(count, 8.0, "short")
@@ -56,7 +66,7 @@ def test_a_window_is_no_longer_than_what_it_averages(count: int) -> None:
     assert one.reading == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("count", "stretch"), [(1, "0-0 s"), (4, "2-3 s"), (40, "35-39 s")])
+@pytest.mark.parametrize(("count", "stretch"), [(1, "0-0 s"), (4, "2.2-3.0 s"), (40, "35-39 s")])
 def test_where_a_residual_is_largest_is_told_of_as_many_stretches_as_there_are_samples(
     count: int, stretch: str
 ) -> None:

@@ -198,6 +198,31 @@ def test_of_peaks_that_are_as_high_the_one_nearest_to_no_lag_is_taken() -> None:
     assert _peak(nudged, STANDARD) == 100
 
 
+def test_a_period_that_is_as_long_as_the_longest_lag_is_one_of_the_peaks() -> None:
+    even = np.cos(2.0 * np.pi * np.arange(-100, 101) / 100.0) - 0.03
+    even[[0, -1]] += 0.01  # a gain that drifts
+    assert _peak(even, STANDARD) == 100
+
+
+@pytest.mark.parametrize(("presses", "power", "rate_hz"), [(6, 0.5, 5.0), (6, 1.0, 20.0), (7, 2.0, 20.0)])
+def test_a_reading_that_falls_over_a_few_even_presses_has_a_baseline_that_follows_it(
+    presses: int, power: float, rate_hz: float
+) -> None:
+    """Their period may be the longest lag that is looked for; smoothed by much they are sines."""
+    place = presses * np.arange(193) / 193.0
+    load = 26.0 * np.maximum(np.sin(2.0 * np.pi * (place - 0.25)), 0.0) ** power * (1.0 + 0.05 * place)
+    noise = np.random.default_rng(2).standard_normal((2, place.size))
+    read = 1300.0 - 230.0 * np.sqrt(load) + 3.0 * noise[0]
+    time_s = np.arange(place.size) / rate_hz
+    run = Recording.from_arrays(time_s=time_s, force_n=load + 0.02 * noise[1], pressure_counts=read)
+    found = diagnose(run)
+    assert found.baseline is not None
+    assert found.baseline.fit_percent > 60.0
+    assert found.extended is not None
+    assert found.extended.rmse < 0.5 * found.baseline.rmse
+    assert found.causes[0].effect.kind == "static_curve"
+
+
 def test_what_rises_to_the_longest_lag_is_no_peak() -> None:
     rising = np.linspace(0.0, 1.0, 201)
     assert _peak(rising, STANDARD) is None

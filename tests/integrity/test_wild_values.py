@@ -260,3 +260,21 @@ def test_of_the_load_no_samples_are_taken_but_those_that_are_none() -> None:
     assert np.flatnonzero(~_with_known_load(run, findings).load.present).tolist() == [3, 5, 6]
     assert _with_known_load(run, findings[2:]) is run
     assert _with_known_load(run, ()) is run
+
+
+@pytest.mark.parametrize("ramp", [(0.2, 0.5, 0.8), (0.3, 0.6), (0.1, 0.3, 0.5, 0.7, 0.9)])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_the_few_samples_of_a_ramp_before_a_long_hold_are_none(ramp: tuple[float, ...], is_first: bool) -> None:
+    """A relaxation test: a stretch within a few samples, then a hold of which the span is that of the noise."""
+    hold = 1.0 + 1e-4 * NOISE[0][:400]
+    load = 800.0 * np.concatenate([ramp, hold] if is_first else [hold, ramp[::-1]])
+    read = 100.0 * (1.0 + 0.2 * np.exp(-np.arange(load.size) / 50.0)) + 0.1 * NOISE[1][: load.size]
+    run = Recording.from_arrays(time_s=0.01 * np.arange(load.size), force_n=load, pressure_mbar=read)
+    assert without_wild(run, STANDARD)[1] == []
+
+
+@pytest.mark.parametrize("at", [0, TIME_S.size - 1])
+def test_one_number_with_which_a_recording_begins_or_ends_is(at: int) -> None:
+    run, findings = without_wild(_wild("force", {at: -99999.0}), STANDARD)
+    assert [finding.kind for finding in findings] == ["spikes"]
+    assert not run["force"].present[at]

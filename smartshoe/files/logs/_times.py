@@ -93,7 +93,11 @@ def check_increasing(sheet: Sheet, time_s: Array) -> None:
         fault = "repeats" if step[at] == 0 else "goes back"
         more = int(np.count_nonzero(~(step > 0))) - 1
         where, which = (f", as in {more} more", "those rows") if more else ("", "that row")
-        by_rate = ", or read all by their rate (--time 'rows[100Hz]')" if more and (step >= 0.0).all() else ""
+        if not more and at + 2 < time_s.size and step[at] < 0 and time_s[at + 2] < time_s[at]:
+            which = "that row and those after it"  # the clock was set back
+        by_rate = ""
+        if more and (step >= 0.0).all() and time_s[-1] > time_s[0]:  # of times that were rounded
+            by_rate = f", or read all by their rate (--time 'rows[{step.size / (time_s[-1] - time_s[0]):.4g}Hz]')"
         raise InputError(
             f"{sheet.place(at + 1)}: time {fault} ({time_s[at]:.9g} s, then {time_s[at + 1]:.9g} s){where}: remove or"
             f" re-time {which}{by_rate}"

@@ -92,10 +92,14 @@ def _said_unit(sheet: Sheet, text: str, choice: str, option: str) -> Unit:
         found = declared(text.strip())
     if found is None:
         raise UnitError(
-            f"{sheet.path}: unit {text!r} in {option} {choice!r} is not known: use one such as"
-            f" {_USUAL.get(option, 'mbar, V, counts, ohm or mm')}"
+            f"{sheet.path}: unit {text!r} in {option} {choice!r} is not known: use one such as {_usual(option)}"
         )
     return found
+
+
+def _usual(option: str) -> str:
+    """Units of what an option names, for a person whose own is not known."""
+    return _USUAL.get(option, "mbar, V, counts, ohm or mm")
 
 
 def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:
@@ -114,7 +118,8 @@ def need_unit(sheet: Sheet, found: Pick, option: str, example: str) -> Unit:
     if found.unit is None:
         name = sheet.columns[found.index].name
         raise InputError(
-            f"{sheet.path} gives column {name!r} no unit: add it in brackets, for example {option} '{name}[{example}]'"
+            f"{sheet.path} gives column {name!r} no unit: add its own in brackets, for example"
+            f" {option} '{name}[{example}]' (units such as {_usual(option)})"
         )
     return found.unit
 
@@ -124,6 +129,8 @@ def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example
     in_unit = need_unit(sheet, found, option, example)
     if in_unit.quantity != quantity:
         also = ""
+        if in_unit.quantity == "unknown":
+            also = f", or say in brackets what it is in ({_usual(option)})"
         if quantity == "force" and in_unit.quantity == "length":  # a unit that is stretched is diagnosed as any other
             also = f", or take the unit out of its title and say '[{example}]' to use its numbers in the load's place"
         raise UnitError(

@@ -13,7 +13,7 @@ from smartshoe.integrity import DataFault
 from smartshoe.models.effects import catalogue, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
-from smartshoe.report.numbers import plain
+from smartshoe.report.numbers import plain, with_unit
 from smartshoe.report.wording import sentence, words
 from smartshoe.signals.noise import NORMAL_95
 
@@ -148,8 +148,8 @@ def gain_sentence(gain: Gain) -> str:
     rises, *change = _way_of(gain)
     outcome = f"{'rises' if rises else 'falls'} by {_percent_text(*change)}"
     return (
-        f"On data that was not fitted, the error is {without} {gain.unit} without it and {within} {gain.unit} with it:"
-        f" it {outcome}."
+        f"On data that was not fitted, the error is {with_unit(without, gain.unit)} without it and"
+        f" {with_unit(within, gain.unit)} with it: it {outcome}."
     )
 
 
@@ -164,13 +164,13 @@ def how_much(diagnosis: Diagnosis) -> str | None:
     if before is None or after is None:
         return None
     said = (
-        f"on data that was not fitted, the simulated reading is off by {plain(before.rmse)} {before.unit}"
+        f"on data that was not fitted, the simulated reading is off by {with_unit(plain(before.rmse), before.unit)}"
         f" ({plain(share_of_full_scale(diagnosis, before.rmse), 2)} % of full scale, rms)"
     )
     if after.rmse < 0.98 * before.rmse:
         what = "what was found" if diagnosis.causes else "effects too small or too unsure for a name"
         said += (
-            f"; with {what} it is off by {plain(after.rmse)} {after.unit}"
+            f"; with {what} it is off by {with_unit(plain(after.rmse), after.unit)}"
             f" ({plain(share_of_full_scale(diagnosis, after.rmse), 2)} %)"
         )
     return sentence(said)
@@ -256,7 +256,7 @@ def what_was_gained(diagnosis: Diagnosis) -> str:
 
 def _of_scale(diagnosis: Diagnosis, standing: GoodnessOfFit, value: float) -> str:
     """A figure of ``standing`` in the reading's unit, and of full scale."""
-    return f"{plain(value)} {standing.unit} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
+    return f"{with_unit(plain(value), standing.unit)} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
 
 
 def _change(before: float, after: float) -> str:
@@ -380,9 +380,9 @@ def nothing_left(diagnosis: Diagnosis) -> str:
     if of_scale <= 100.0 * diagnosis.thresholds.material:
         return "Taken over the whole record, no structure that matters stands out of the noise."
     return (
-        f"Beside noise {plain(after.structure_rms)} {after.unit} ({plain(of_scale, 2)} % of full scale, rms) is left"
-        " over the whole record: no more than small imperfections of a good unit, faults of the data, or equations that"
-        " are not exact, account for."
+        f"Beside noise {with_unit(plain(after.structure_rms), after.unit)} ({plain(of_scale, 2)} % of full scale, rms)"
+        " is left over the whole record: no more than small imperfections of a good unit, faults of the data, or"
+        " equations that are not exact, account for."
     )
 
 

@@ -136,3 +136,11 @@ def test_binary_zeros_inside_text_are_refused(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes() + b"1;0;1\n" * 20000 + b"\x00\x00")
     with pytest.raises(FormatError, match="binary zeros"):
         smartshoe.read(path)
+
+
+def test_remarks_of_a_plain_table_above_an_export_say_what_they_say_there(tmp_path: Path) -> None:
+    path = tmp_path / "second.csv"
+    path.write_text("# continues: first: half\n# unit: heel\nProbe,17\nTime,Load\n(s),(kN)\n0,0.1\n1,0.2\n2,0.1\n")
+    recording = smartshoe.read(path)
+    assert recording.unit == "heel"
+    assert dict(recording.metadata) == {"Probe": "17", "continues": "first: half"}

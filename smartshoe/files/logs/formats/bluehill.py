@@ -47,6 +47,12 @@ def sniff(path: Path, head: bytes) -> bool:
     return is_text(head) and _unit_row(head_lines(head)) is not None
 
 
+def _remark(line: str) -> tuple[str, str] | None:
+    """Key and text of a line ``# key: text`` as plain tables have them, which somebody wrote above the export."""
+    key, colon, text = line.strip().partition(":")
+    return (key.lstrip("# "), text.strip()) if key.startswith("#") and colon else None
+
+
 def _preamble(lines: Sequence[str], delimiter: str) -> dict[str, str]:
     metadata: dict[str, str] = {}
     for number, cells in enumerate(split_cells(lines, delimiter), start=1):
@@ -91,13 +97,18 @@ def read(path: Path) -> Sheet:
         Column(name, (match[1].strip() if (match := _BRACKETED.fullmatch(text)) else ""), values)
         for name, text, values in zip(names, texts, table.columns, strict=True)
     ]
+    above = [(line, _remark(line)) for line in lines[: at - 1]]
+    remarks = dict(remark for _, remark in above if remark is not None)
+    recording_name, unit_name = (remarks.pop(key, None) for key in ("name", "unit"))
     return Sheet(
         path,
         "bluehill",
         columns,
-        _preamble(lines[: at - 1], delimiter),
+        _preamble([line for line, remark in above if remark is None], delimiter) | remarks,
         notes=[*notes, *table.notes],
         first_line=numbers[0],
+        recording_name=recording_name,
+        unit_name=unit_name,
         lines=np.array(numbers, dtype=np.intp),
     )
 
