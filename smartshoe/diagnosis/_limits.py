@@ -144,6 +144,18 @@ def end_of_range_of(model: ExtendedModel) -> str | None:
     )
 
 
+def bent_to_the_end_of(model: ExtendedModel) -> str | None:
+    """What is said of a curve that would bend farther than its equation can."""
+    ended = [part.name for part in model.parts if part.bends_too_little]
+    if not ended:
+        return None
+    return (
+        f"{listed([in_words(name) for name in ended], 'and')} has come to the end of its range: the unit bends farther"
+        " than that equation can, and what it misses may stand in the names of other effects, which are half sure at"
+        " most"
+    )
+
+
 def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
     """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
     if model.wall_ratio != USUAL_WALL_RATIO:  # one is known

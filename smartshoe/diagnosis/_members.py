@@ -46,7 +46,8 @@ class Member:
     which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
     with what another member adds, 0 where all pull against it. ``is_ended``: it lies where it turns into an effect of
     another kind. ``untold``: laws of other kinds that nothing in this data tells from it, each fitted in its place as
-    the ``laws`` are, or the free form of its branch where that follows better.
+    the ``laws`` are, or the free form of its branch where that follows better. ``bends_too_little``: a curve at the end
+    of its range.
     """
 
     effect: Effect
@@ -60,6 +61,7 @@ class Member:
     likeness: float = 0.0
     is_ended: bool = False
     untold: tuple[Alternative, ...] = ()
+    bends_too_little: bool = False
 
     @property
     def is_any_curve(self) -> bool:
@@ -105,6 +107,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 float(likeness[k].max()),
                 is_ended,
                 tuple(_of_kind(law, less[k], extended) for law in rivals) if is_there else (),
+                extended.model.part(one.name).bends_too_little,
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))

@@ -16,6 +16,7 @@ from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, re
 from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._limits import (
     SAID,
+    bent_to_the_end_of,
     elsewhere_of,
     end_of_range_of,
     own_gains_of,
@@ -228,7 +229,8 @@ def _limits(
     """All that limits the diagnosis, in sentences."""
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_loss or elsewhere else None
-    of_model = end_of_range_of(extended), wall_ratio_of(extended, given.sessions, thresholds)
+    by_wall = wall_ratio_of(extended, given.sessions, thresholds)
+    of_model = end_of_range_of(extended), bent_to_the_end_of(extended), by_wall
     return (
         *given.limits,
         *([worse_of(won, ways)] if won.is_loss else []),

@@ -42,6 +42,13 @@ class Part:
         valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
         return tuple((one, value) for one, value in valued if one.is_where_kind_ends(value))
 
+    @property
+    def bends_too_little(self) -> bool:
+        """Whether it is a curve whose strength lies at the end of its range: the unit may bend farther."""
+        valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
+        ends = (one.is_stretched(value) for one, value in valued if one.null is not None and value != one.null)
+        return self.effect.is_memoryless and any(ends)
+
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:

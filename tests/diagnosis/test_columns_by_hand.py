@@ -552,6 +552,13 @@ def test_a_loss_is_of_what_is_material_and_of_more_than_a_few_cycles(count: int,
     assert not gain(before, after, SCALE, coarse).is_loss
 
 
+@pytest.mark.parametrize(("before", "after", "grown"), [(3.0, 5.0, 4.0), (5.0, 3.0, 0.0), (2.0, 2.0, 0.0)])
+def test_an_error_grows_by_the_root_of_what_its_square_does(before: float, after: float, grown: float) -> None:
+    """Of one cycle as of many: it is what verdicts ask, certain or not."""
+    first, second = (Errors(np.array([(0.001 * rms) ** 2]), np.ones(1), 1.0) for rms in (before, after))
+    assert gain(first, second, SCALE, STANDARD).growth(SCALE) == pytest.approx(0.001 * grown)
+
+
 def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
     """Of a model without an arm the force is the reading over the gain; its offset is the recording's own."""
     plain = replace(MODEL, relaxing_share=0.0)

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
+from smartshoe.diagnosis._limits import bent_to_the_end_of
 from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.diagnosis._naming import Name, confidence_of, names_of, probability_of_kind, probability_of_law
 from smartshoe.errors import UsageError
-from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
+from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect, in_words
 from smartshoe.models.extended import ExtendedModel
 
 catalogue_module = import_module("smartshoe.models.effects.catalogue")  # the package has a function of this name
@@ -260,6 +261,39 @@ def test_a_law_of_another_kind_that_nothing_tells_from_it_is_equivalent_where_it
     assert only(names_of([near], 0.0, STANDARD)).law_probability == pytest.approx(0.5)
     both = [near, member("cycle_conditioning")]  # what is there itself stands for no other
     assert [one.equivalents for one in names_of(both, 0.0, STANDARD)] == [(), ()]
+
+
+def test_beside_a_curve_that_would_bend_farther_than_it_can_what_is_no_curve_is_half_sure_at_most() -> None:
+    """What its equation misses may stand in another's name."""
+    curve, leak = member("sensor_nonlinearity", size=0.07), member("linear_leak")
+    assert [one.is_sure for one in names_of([curve, leak], 0.0, STANDARD)] == [True, True]
+    ended = replace(curve, bends_too_little=True)
+    beside = [one for one in names_of([ended, leak], 0.0, STANDARD) if one.member is leak]
+    assert all(one.kind_probability <= 0.5 and not one.is_sure for one in beside)
+    assert names_of([ended, leak], 0.0, STANDARD)[0].is_sure
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "ends"),
+    [
+        ("sensor_nonlinearity", {"bow": 0.2}, True),
+        ("sensor_nonlinearity", {"bow": 0.19}, False),
+        ("sensor_nonlinearity", {"bow": 0.1, "wave": -0.08}, True),
+        ("contact_area", {"bow": 0.26}, True),
+        ("contact_area", {"bow": 0.0}, False),
+        ("saturation", {"slope_lost": 1.0}, False),  # it holds at its level: no slope can be lost beyond all
+        ("gain_drift", {"drift_rate": 1e9}, False),  # no curve
+    ],
+)
+def test_a_curve_at_the_end_of_its_range_bends_too_little(name: str, values: dict[str, float], ends: bool) -> None:
+    one = effect(name)
+    given = [values.get(parameter.name, value) for parameter, value in zip(one.parameters, one.start(), strict=True)]
+    model = MODEL.with_part(one, given)
+    assert model.part(name).bends_too_little is ends
+    said = bent_to_the_end_of(model)
+    assert (said is not None) is ends
+    if said is not None:
+        assert said.startswith(f"{in_words(name)} has come to the end of its range")
 
 
 def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:

@@ -416,3 +416,13 @@ def test_what_single_load_cycles_hold_tells_nothing_that_asks_for_later_ones() -
     found = replace(_shown(_rising((0.1, 1.0))), present=frozenset({"shuffled_loads", "steps", "repeats"}))
     assert replace(found, is_cycled=True).tells_apart == found.present
     assert replace(found, is_cycled=False).tells_apart == {"steps"}
+
+
+@pytest.mark.parametrize("last", [0.4, 0.55])
+def test_a_rise_that_the_recordings_end_cuts_off_has_no_peak_that_falls_with_time(last: float) -> None:
+    """Two alike and a part of a third: nothing goes with the clock; two whole ones of which the second is lower do."""
+    corners = np.array([0.0, 1.0, 0.0, 1.0, 0.0, last])
+    cut = _session(np.interp(np.arange(0.0, 100.0), 20.0 * np.arange(6), corners), 0.1)
+    assert not excitation_of([cut], STANDARD).goes_with_the_clock
+    whole = _session(np.interp(np.arange(0.0, 120.0), 20.0 * np.arange(7), [*corners[:-1], 0.55, 0.0]), 0.1)
+    assert excitation_of([whole], STANDARD).goes_with_the_clock

@@ -31,12 +31,14 @@ class Saturation(Effect):
     imitates = "static_curve"  # without ties at a rail it is a curve among curves
     says = "readings flatten near the largest one (or at zero) however the load goes on"
     parameters = (
-        EffectParameter("slope_lost", "1", "share of the slope lost above the level", 0.0, 0.0, 1.0, 0.1),
+        EffectParameter(
+            "slope_lost", "1", "share of the slope lost above the level", 0.0, 0.0, 1.0, 0.1, natural="both"
+        ),
         EffectParameter("level", "FS_reading", "reading where it begins", None, 0.55, 1.5, 0.1, kind_ends="lower"),
         EffectParameter(
             "knee", "FS_reading", "half width of the transition", None, 1e-3, 0.08, 0.01, kind_ends="upper"
         ),
-        EffectParameter("rail", "1", "share lost of a pressure below zero", 0.0, 0.0, 1.0, 0.1),
+        EffectParameter("rail", "1", "share lost of a pressure below zero", 0.0, 0.0, 1.0, 0.1, natural="both"),
     )
     shapes = tuple(
         {"level": level, "knee": knee}
