@@ -108,3 +108,13 @@ def test_bins_of_a_constant_are_that_constant(x: list[float], level: float) -> N
     filled = np.isfinite(found.mean)
     np.testing.assert_allclose(found.mean[filled], level, atol=1e-12)
     np.testing.assert_allclose(found.sd[filled], 0.0, atol=1e-6)
+
+
+def test_few_samples_fall_into_few_bins_and_are_seen() -> None:
+    """Of a hundred that are judged, half of them while the load rises, most bins have enough for a mean."""
+    x = np.random.default_rng(3).uniform(0.0, 1.0, 100)
+    edges = edges_of(x)
+    assert edges.size - 1 == 5
+    assert np.isfinite(binned(x[::2], x[::2], edges).mean).all()
+    assert edges_of(np.linspace(0.0, 1.0, 10_000)).size - 1 == 24
+    assert edges_of(x[:8]).size - 1 == 4

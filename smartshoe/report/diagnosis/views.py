@@ -16,7 +16,7 @@ SLOPE_S = 0.2  # over which a load's rate is taken
 STANDING_SHARE = 0.004  # of full scale a second: below it the load stands
 FEWEST_IN_A_BIN = 5
 FEWEST_IN_A_CELL = 15  # of the map over load and rate, where the fastest ramps leave few samples
-BINS = 24
+MOST_BINS, FEWEST_BINS = 24, 4
 ENOUGH = 20_000  # samples of a recording, to find its ramps
 PLACES = 10  # of a cycle, in a map
 MOST_GROUPS = 12  # of cycles, in a map
@@ -31,8 +31,13 @@ class Binned:
     sd: Array
 
 
-def edges_of(x: Array, bins: int = BINS) -> Array:
-    """(bins + 1,) edges of equal bins between the 0.5th and 99.5th percentile of ``x`` (n,)."""
+def edges_of(x: Array, bins: int | None = None) -> Array:
+    """(bins + 1,) edges of equal bins between the 0.5th and 99.5th percentile of ``x`` (n,).
+
+    Where their number is not given, of few samples fewer: loading and unloading share them, and not evenly.
+    """
+    if bins is None:
+        bins = min(max(x.size // (4 * FEWEST_IN_A_BIN), FEWEST_BINS), MOST_BINS)
     low, high = (float(edge) for edge in np.percentile(x, [0.5, 99.5])) if x.size else (0.0, 0.0)
     return np.linspace(low, high if high > low else low + 1.0, bins + 1)
 

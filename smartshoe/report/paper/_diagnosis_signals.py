@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from smartshoe.arrays import Array
 from smartshoe.diagnosis import Trace
 from smartshoe.report.diagnosis.views import (
-    BINS,
     MOST_GROUPS,
     EvidenceView,
     TraceSegment,
@@ -197,7 +196,7 @@ def _limit(values: Array) -> float:
     return 1.25 * float(np.percentile(np.abs(values), 99.7)) or 1.0
 
 
-def _mean_and_band(axis: Any, x: Array, values: Array, colour: str, label: str = "", bins: int = BINS) -> None:
+def _mean_and_band(axis: Any, x: Array, values: Array, colour: str, label: str = "", bins: int | None = None) -> None:
     """The mean as a line, one standard deviation about it as a band."""
     found = binned(x, values, edges_of(x, bins))
     axis.fill_between(found.x, found.mean - found.sd, found.mean + found.sd, color=colour, alpha=0.15, lw=0)
