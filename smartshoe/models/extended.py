@@ -44,10 +44,10 @@ class Part:
 
     @property
     def bends_too_little(self) -> bool:
-        """Whether it is a curve whose strength lies at the end of its range: the unit may bend farther."""
+        """Whether it is a curve's law whose strength lies at the end of its range: the unit may bend farther."""
         valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
         ends = (one.is_stretched(value) for one, value in valued if one.null is not None and value != one.null)
-        return self.effect.is_memoryless and any(ends)
+        return self.effect.is_memoryless and not self.effect.is_flexible and any(ends)
 
 
 @dataclass(frozen=True, eq=False)
