@@ -56,12 +56,13 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
 class _Tamed:
     """A recording as ``logged``, but each channel at its own rate, and counted on; ``recording``: without wild values.
 
-    ``findings``: what was found on the way.
+    ``findings``: what was found on the way. ``is_rest``: samples that are no measurements of their own were left out.
     """
 
     logged: Recording
     recording: Recording
     findings: tuple[Finding, ...]
+    is_rest: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +154,7 @@ def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tam
         measured, between = without_interpolated(read, thresholds)
         logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
-        made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild)))
+        made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild), bool(held or between)))
     return made
 
 
@@ -174,8 +175,7 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
     """What was found in one recording; ``turned``: its reading rises where it seems to fall."""
     recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
-    is_rest = any(one.kind in ("interpolated", "held_samples") for one in tame.findings)
-    short = list(short_recording(recording, thresholds, is_rest))
+    short = list(short_recording(recording, thresholds, tame.is_rest))
     if short:
         return _Examined([*tame.findings, *short], ~usable)
     findings = [*tame.findings, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]

@@ -44,10 +44,14 @@ class Part:
 
     @property
     def bends_too_little(self) -> bool:
-        """Whether it is a curve's law whose strength lies at the end of its range: the unit may bend farther."""
+        """Whether it is a curve's law whose strength lies at the end of its range: the unit may bend farther.
+
+        Not where its kind ends, beyond which it is any curve.
+        """
         valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
         ends = (one.is_stretched(value) for one, value in valued if one.null is not None and value != one.null)
-        return self.effect.is_memoryless and not self.effect.is_flexible and any(ends)
+        is_law = self.effect.is_memoryless and not (self.effect.is_flexible or self.kind_ends_at)
+        return is_law and any(ends)
 
 
 @dataclass(frozen=True, eq=False)

@@ -282,6 +282,7 @@ def test_beside_a_curve_that_would_bend_farther_than_it_can_what_is_no_curve_is_
         ("contact_area", {"bow": 0.26}, True),
         ("contact_area", {"bow": 0.0}, False),
         ("saturation", {"slope_lost": 1.0}, False),  # it holds at its level: no slope can be lost beyond all
+        ("dead_band", {"lost_load": 0.3}, False),  # where its kind ends it is any curve
         ("flexible_curve", {"slope_5": -0.95}, False),  # as flat as a curve that rises may be
         ("gain_drift", {"drift_rate": 1e9}, False),  # no curve
     ],
