@@ -163,13 +163,11 @@ class Gain:
 
     def certain_fall(self, scale: Scale) -> float:
         """Rms, a share of full scale, of what is done away with for certain; 0 where nothing is."""
-        square = self.rmse_before**2 - self.rmse_after**2
-        return math.sqrt(square) / abs(scale.reading) if self.is_certain and square > 0.0 else 0.0
+        return _beyond(self.rmse_before, self.rmse_after, scale) if self.is_certain else 0.0
 
     def growth(self, scale: Scale) -> float:
         """Rms, a share of full scale, by which the error grows, certain or not; 0 where it does not."""
-        square = self.rmse_after**2 - self.rmse_before**2
-        return math.sqrt(square) / abs(scale.reading) if square > 0.0 else 0.0
+        return _beyond(self.rmse_after, self.rmse_before, scale)
 
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
@@ -180,6 +178,12 @@ class Gain:
             "gain_percent": finite_or_none(self.gain_percent),
             "ci95": [finite_or_none(bound) for bound in self.ci95],
         }
+
+
+def _beyond(more: float, less: float, scale: Scale) -> float:
+    """Rms, a share of full scale, of what ``more`` holds beside ``less``; 0 where it holds no more."""
+    square = more**2 - less**2
+    return math.sqrt(square) / abs(scale.reading) if square > 0.0 else 0.0
 
 
 def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds) -> Gain:

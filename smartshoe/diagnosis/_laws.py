@@ -112,8 +112,4 @@ def _law_of(
 
 def _is_stretched(model: ExtendedModel, law: Effect) -> bool:
     """Whether a shape of a law lies at a bound: beyond it the equation means something else."""
-    last = model.part(law.name)
-    return any(
-        parameter.null is None and parameter.is_stretched(float(value))
-        for parameter, value in zip(last.effect.parameters, last.values, strict=True)
-    )
+    return any(one.null is None and one.is_stretched(value) for one, value in model.part(law.name).valued)

@@ -37,10 +37,14 @@ class Part:
         return self.effect.name
 
     @property
+    def valued(self) -> list[tuple[EffectParameter, float]]:
+        """Each parameter with its value."""
+        return [(one, float(value)) for one, value in zip(self.effect.parameters, self.values, strict=True)]
+
+    @property
     def kind_ends_at(self) -> tuple[tuple[EffectParameter, float], ...]:
         """The parameters whose values lie where it turns into an effect of another kind."""
-        valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
-        return tuple((one, value) for one, value in valued if one.is_where_kind_ends(value))
+        return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
 
     @property
     def bends_too_little(self) -> bool:
@@ -48,8 +52,7 @@ class Part:
 
         Not where its kind ends, beyond which it is any curve.
         """
-        valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
-        ends = (one.is_stretched(value) for one, value in valued if one.null is not None and value != one.null)
+        ends = (one.is_stretched(value) for one, value in self.valued if one.null is not None and value != one.null)
         is_law = self.effect.is_memoryless and not (self.effect.is_flexible or self.kind_ends_at)
         return is_law and any(ends)
 
@@ -254,10 +257,7 @@ class ExtendedModel:
             "reading_unit": self.reading_unit,
             "wall_ratio": self.wall_ratio,
             "noise": self.noise,
-            "effects": {
-                part.name: {p.name: float(v) for p, v in zip(part.effect.parameters, part.values, strict=True)}
-                for part in self.parts
-            },
+            "effects": {part.name: {parameter.name: value for parameter, value in part.valued} for part in self.parts},
         }
 
     @classmethod

@@ -17,6 +17,7 @@ from smartshoe.files.gate import require_columns
 from smartshoe.files.logs._numbers import is_number, numbers_of
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import even_rows, head_lines, is_text, read_lines, split_cells
+from smartshoe.files.logs.formats.plain import remarks
 from smartshoe.recording import Recording
 
 _BRACKETED = re.compile(r"\s*[(（\[]([^()（）]*)[)）\]]\s*")
@@ -45,12 +46,6 @@ def _unit_row(lines: Sequence[str]) -> tuple[int, str] | None:
 def sniff(path: Path, head: bytes) -> bool:
     """Whether a row of names with a row of units in brackets below it stands near the beginning."""
     return is_text(head) and _unit_row(head_lines(head)) is not None
-
-
-def _remark(line: str) -> tuple[str, str] | None:
-    """Key and text of a line ``# key: text`` as plain tables have them, which somebody wrote above the export."""
-    key, colon, text = line.strip().partition(":")
-    return (key.lstrip("# "), text.strip()) if key.startswith("#") and colon else None
 
 
 def _preamble(lines: Sequence[str], delimiter: str) -> dict[str, str]:
@@ -97,14 +92,15 @@ def read(path: Path) -> Sheet:
         Column(name, (match[1].strip() if (match := _BRACKETED.fullmatch(text)) else ""), values)
         for name, text, values in zip(names, texts, table.columns, strict=True)
     ]
-    above = [(line, _remark(line)) for line in lines[: at - 1]]
-    remarks = dict(remark for _, remark in above if remark is not None)
-    recording_name, unit_name = (remarks.pop(key, None) for key in ("name", "unit"))
+    # Somebody may have written lines of a plain table above the export.
+    marks = [line for line in lines[: at - 1] if line.startswith("#") and ":" in line]
+    said = {key: "\n".join(values) for key, values in remarks(marks).items()}
+    recording_name, unit_name = (said.pop(key, None) for key in ("name", "unit"))
     return Sheet(
         path,
         "bluehill",
         columns,
-        _preamble([line for line, remark in above if remark is None], delimiter) | remarks,
+        _preamble(["" if line in marks else line for line in lines[: at - 1]], delimiter) | said,
         notes=[*notes, *table.notes],
         first_line=numbers[0],
         recording_name=recording_name,
