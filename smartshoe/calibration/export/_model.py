@@ -171,10 +171,7 @@ class ExtendedFilterModel(FilterModel):
             f" {filter_.model.relaxing_share:.6g} of the load at {filter_.model.relaxation_rate_per_s:.6g} 1/s"
         )
         for part in filter_.model.parts:
-            values = ", ".join(
-                f"{p.name} = {float(value)!r} {p.unit}"
-                for p, value in zip(part.effect.parameters, part.values, strict=True)
-            )
+            values = ", ".join(f"{one.name} = {value!r} {one.unit}" for one, value in part.valued)
             found[f"effect {part.name}"] = one_safe_line(values or "no parameter")
         for name, says in filter_.not_inverted.items():
             found[f"not compensated, {name}"] = one_safe_line(says)
