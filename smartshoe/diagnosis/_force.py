@@ -35,6 +35,7 @@ class Compensation:
 
     ``model`` is the extended one, but for effects (``passed_over``) whose undoing does more harm than good, or the
     plain one. ``before`` is the plain one's error, ``whole`` that of the extended one with all its effects.
+    ``rejected``: the error of the one that would be ``model``, where it is worse on what is held out.
     """
 
     model: ExtendedModel
@@ -43,6 +44,7 @@ class Compensation:
     whole: ForceError
     passed_over: tuple[str, ...] = ()
     is_plain: bool = False
+    rejected: ForceError | None = None
 
 
 def compensation(
@@ -52,7 +54,7 @@ def compensation(
 
     To undo a lag, a gain that goes by the rate or a curve that hardly rises makes more of the reading's ``noise``, and
     of all else that is left of it. Where that is so, an effect is undone only if the force is not nearer to the load
-    without. Where the plain model's is nearer all the same, it is the one.
+    without. Where the plain model's is nearer all the same, it is the one, and where it is on what is held out.
     """
     before, whole = force_error(fine, plain), force_error(fine, extended)
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
@@ -68,35 +70,35 @@ def compensation(
     is_nearer = bool(model.parts) and least <= (1.0 + thresholds.standing) * before.fitted_n
     if extended.parts and not is_nearer:
         return Compensation(plain, before, before, whole, extended.names, is_plain=True)
-    if model is extended:
-        return Compensation(extended, whole, before, whole)
+    error = whole if model is extended else force_error(fine, model)
+    if error.held_out_n > (1.0 + thresholds.standing) * before.held_out_n:
+        return Compensation(plain, before, before, whole, extended.names, is_plain=True, rejected=error)
     passed_over = tuple(name for name in extended.names if name not in model.names)
-    return Compensation(model, force_error(fine, model), before, whole, passed_over)
+    return Compensation(model, error, before, whole, passed_over)
 
 
-def force_of(found: Compensation, thresholds: Thresholds) -> list[str]:
+def force_of(found: Compensation) -> list[str]:
     """What is said of an extended model that gives the load back worse than the plain one does, or than a part does."""
-    said = []
+    if found.rejected is not None:
+        return [
+            "the force that the extended model gives back is worse than the baseline's on held-out data"
+            f" ({found.before.held_out_n:.3g} to {found.rejected.held_out_n:.3g} N): the calibration compensates by the"
+            " baseline, and its twin simulates with the effects"
+        ]
     if found.is_plain:
-        said.append(
+        return [
             "the extended model fits the reading but gives a worse force: on what was fitted it is off by"
             f" {found.whole.fitted_n:.3g} N, the baseline by {found.before.fitted_n:.3g} N; so the calibration"
             " compensates by the baseline, and its twin simulates with the effects"
-        )
-    elif found.passed_over:
-        said.append(
+        ]
+    if found.passed_over:
+        return [
             f"the calibration does not undo {listed(found.passed_over)}, which would make more of the noise than it"
             f" takes off: on what was fitted the force is off by {found.error.fitted_n:.3g} N without, by"
             f" {found.whole.fitted_n:.3g} N with, by {found.before.fitted_n:.3g} N by the baseline; its twin simulates"
             " with all effects"
-        )
-    if found.error.held_out_n > (1.0 + thresholds.standing) * found.before.held_out_n:
-        said.append(
-            "the force that the extended model gives back is worse than the baseline's on held-out data"
-            f" ({found.before.held_out_n:.3g} to {found.error.held_out_n:.3g} N): compensate by the baseline, as"
-            " identify calibrates it"
-        )
-    return said
+        ]
+    return []
 
 
 def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:

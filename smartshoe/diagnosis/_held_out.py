@@ -169,6 +169,11 @@ class Gain:
         """Rms, a share of full scale, by which the error grows, certain or not; 0 where it does not."""
         return _beyond(self.rmse_after, self.rmse_before, scale)
 
+    @property
+    def is_rejected(self) -> bool:
+        """Whether the error grows, certain or not: what makes data that it was not fitted to worse is not adopted."""
+        return self.rmse_after > self.rmse_before
+
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
         return {

@@ -177,14 +177,19 @@ def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds:
 
 
 def worse_of(won: Gain, beyond: str | None) -> str:
-    """What is said of an extension whose gain `is_loss`; ``beyond``: how the loads there go beyond the fitted ones."""
+    """What is said of an extension whose gain `is_rejected`; ``beyond``: how loads there go beyond the fitted ones."""
     low, high = won.ci95
+    by = f"by {_percent(-high)} to {_percent(-low)} %" if won.is_certain else "which may be chance"
     why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
     return (
-        f"on held-out data the extended model is worse than the baseline ({won.rmse_before:.3g} to"
-        f" {won.rmse_after:.3g} {won.unit}, by {-high:.2g} to {-low:.2g} %): {why}; do not correct such recordings by"
-        " it before one of them is among those that are fitted"
+        f"on held-out data the extended model is worse than the baseline ({won.rmse_before:.4g} to"
+        f" {won.rmse_after:.4g} {won.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
+        " baseline's until such a recording is among those that are fitted"
     )
+
+
+def _percent(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100.0 else f"{value:.2g}"
 
 
 def elsewhere_of(off: float, within: float, beyond: str | None) -> str:

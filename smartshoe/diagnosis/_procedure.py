@@ -14,6 +14,7 @@ from smartshoe.diagnosis._force import Compensation, compensation, force_of, not
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
+from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._limits import (
     SAID,
     bent_to_the_end_of,
@@ -68,9 +69,10 @@ def diagnosed(
     sessions, fine, scale = given.sessions, given.fine, given.scale
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
-    plain = found.baseline.model
     left = _left_by(found, given, integrity.faults)
-    off = [residual_of(one, found.fit.model) for one in fine]  # thinning makes noise of neighbours alike
+    # At the full rate: thinning makes noise of neighbours alike.
+    before, off = ([residual_of(one, fit.model) for one in fine] for fit in (found.baseline, found.fit))
+    plain = replace(found.baseline.model, noise=fitted_rms(fine, before))
     extended = replace(found.fit.model, noise=fitted_rms(fine, off))
     baseline, best = errors(fine, plain), errors(fine, extended)
     named = _named(found, given, left)
@@ -94,14 +96,17 @@ def diagnosed(
     )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
-    parameters, covariance = joint_parameters(found.fit, scale)
-    force = compensation(fine, extended, plain, thresholds)
+    adopted = _Adopted(found.fit, extended, best, left.after)
+    if won.is_rejected:  # all that what is held out decides: no extension is adopted that is worse there
+        adopted = _Adopted(found.baseline, plain, baseline, left.before)
+    parameters, covariance = joint_parameters(adopted.fit, scale)
+    force = compensation(fine, adopted.model, plain, thresholds)
     says = sentence_of(
         verdict,
         names_in(causes, len(minor)),
         baseline,
         best,
-        not_explained_of(rest, outcome.elsewhere, outcome.unproven, thresholds),
+        not_explained_of(rest, 0.0 if won.is_rejected else outcome.elsewhere, outcome.unproven, thresholds),
         thresholds,
         worse=won.is_loss,
         withheld=_is_silent(found, given) or bool(named.limits or found.zero_changes or found.own_gains),
@@ -116,10 +121,10 @@ def diagnosed(
         minor=minor,
         data_faults=(*integrity.faults, *noise),
         baseline=_goodness(baseline, force.before.held_out_n, left.before, scale),
-        extended=_goodness(best, force.error.held_out_n, left.after, scale),
+        extended=_goodness(adopted.errors, force.error.held_out_n, adopted.left, scale),
         gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
-        explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
+        explained_percent=_percent_less(adopted.errors.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _nearest(found),
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
@@ -128,7 +133,8 @@ def diagnosed(
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
-        model=_with_offset(extended, named.zeros, sessions, scale),
+        model=_with_offset(adopted.model, named.zeros, sessions, scale),
+        rejected=extended if won.is_rejected else None,
         baseline_model=plain,
         force_model=_with_offset(force.model, named.zeros, sessions, scale) if force.passed_over else None,
         parameters=parameters,
@@ -136,6 +142,16 @@ def diagnosed(
         traces=tuple(_trace(session, plain, extended, scale) for session in fine),
         thresholds=thresholds,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Adopted:
+    """The ``model`` that is offered, as it was ``fit``; its held-out ``errors``, and what it has ``left``."""
+
+    fit: Fit
+    model: ExtendedModel
+    errors: Errors
+    left: ResidualStructure
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,15 +244,16 @@ def _limits(
 ) -> tuple[str, ...]:
     """All that limits the diagnosis, in sentences."""
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
-    ways = beyond(given.sessions, given.scale, thresholds) if won.is_loss or elsewhere else None
+    ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
     by_wall = wall_ratio_of(extended, given.sessions, thresholds)
+    undone = extended if force.is_plain else force.model
     of_model = end_of_range_of(extended), bent_to_the_end_of(extended), by_wall
     return (
         *given.limits,
-        *([worse_of(won, ways)] if won.is_loss else []),
-        *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_loss else []),
-        *force_of(force, thresholds),
-        *not_undone_of(extended if force.is_plain else force.model, given.fine[0].conditions.step_s),
+        *([worse_of(won, ways)] if won.is_rejected else []),
+        *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
+        *force_of(force),
+        *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
         *named.limits,
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),

@@ -187,6 +187,8 @@ class Diagnosis(Summarised):
     """What measured data says of its simulation; `to_dict` is what `smartshoe diagnose --json` writes.
 
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
+    ``rejected``: the extended model that what was fitted speaks for, where ``gain`` tells that it is worse on what is
+    held out; ``model``, ``extended`` and ``parameters`` are the plain one's then. None where it is not worse.
     ``force_model`` is the plain one, each with its zero, where its inverse gives the load back and that of ``model``
     does not; None where that does. ``extended.force_rmse_n`` is of the one that `calibration` compensates by.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
@@ -219,6 +221,7 @@ class Diagnosis(Summarised):
     model: ExtendedModel | None = None
     baseline_model: ExtendedModel | None = None
     force_model: ExtendedModel | None = None
+    rejected: ExtendedModel | None = None
     traces: tuple[Trace, ...] = field(default=())
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     covariance: tuple[tuple[float, ...], ...] = ()
@@ -314,4 +317,5 @@ class Diagnosis(Summarised):
             "screening": [{"effect": name, "fall": fall} for name, fall in self.screening],
             "thresholds": described(self.thresholds),
             "model": self.model.to_dict() if self.model else None,
+            "rejected": self.rejected.to_dict() if self.rejected else None,
         }

@@ -162,7 +162,8 @@ def sentence_of(
     elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong
         said = f"{good}, the recordings' own zeros allowed for; {named} is found in these"
     elif worse or best.rmse > baseline.rmse:
-        said = f"{good}; with {named} it is {'worse' if worse else 'no better'} there, good to {by_all}"
+        how = "worse" if worse else "no better"
+        said = f"{good}; with {named} it is {how} there, good to {by_all}, and it stays as it is"
     else:
         said = f"{good}, and to {by_all} with {named}"
     return said if verdict == "explained" else f"{said}{left}"

@@ -201,7 +201,8 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert (told.rivals, told.next_experiment) == (("rival of delay",), "next")
     assert told.likeness is parts.found.likeness
     assert (told.limits, told.leftover, told.screening) == (("limit", "it turned"), None, parts.found.screening)
-    assert (told.model, told.baseline_model, told.parameters) == ("with offset", MODEL, {"p": 1})
+    assert (told.model, told.rejected, told.parameters) == ("with offset", None, {"p": 1})
+    assert told.baseline_model.to_dict() == replace(MODEL, noise=parts.off).to_dict()
     assert (told.covariance, told.traces, told.thresholds) == (((1.0,),), ("trace",), STANDARD)
     seen = parts.seen
     assert [residuals for _, residuals in seen["structure"]] == [
@@ -220,6 +221,29 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
     assert seen["next_experiment"][1] == {"open_": False, "worse": False}  # as little is left as is explained
     assert seen["infer"][0][4] is True
+
+
+@pytest.mark.parametrize(("after", "is_rejected"), [(1.001, True), (1.0, False)])
+def test_an_extension_that_is_worse_where_it_is_judged_is_not_adopted(
+    parts: Any, monkeypatch: pytest.MonkeyPatch, after: float, is_rejected: bool
+) -> None:
+    """It is still told, with its causes and what it would do; what is offered is the plain model's."""
+    parts.names = [_name("linear_leak")]
+    best = replace(BEFORE, squares=after**2 * BEFORE.squares)
+    monkeypatch.setattr(_procedure, "errors", lambda _, model: best if model.parts else BEFORE)
+    monkeypatch.setattr(_procedure, "beyond", lambda *_: None)
+    told = _run_diagnosis(parts)
+    assert [one.name for one in told.causes] == ["linear_leak"]
+    assert told.gain.rmse_after == pytest.approx(after * told.gain.rmse_before)
+    assert told.extended.rmse == pytest.approx(told.baseline.rmse)
+    extended = parts.found.fit.model.names
+    offered = () if is_rejected else extended
+    assert parts.seen["_with_offset"][0][0].names == parts.seen["compensation"][0][1].names == offered
+    assert (told.rejected.names if told.rejected else None) == (extended if is_rejected else None)
+    assert parts.seen["joint_parameters"][0][0] is (parts.found.baseline if is_rejected else parts.found.fit)
+    assert any("; it is rejected" in said for said in told.limits) is is_rejected
+    assert told.explained_percent == 0.0
+    assert told.extended.structure_rms == pytest.approx(42.0 if is_rejected else 2.8)
 
 
 def test_the_sentence_is_told_what_is_in_the_model_and_what_is_left(parts: Any) -> None:

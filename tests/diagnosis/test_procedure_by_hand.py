@@ -208,7 +208,7 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
 def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged() -> None:
     good = "the baseline simulation is good to 10 % of full scale on data it was not fitted to"
     rest = "over all recordings 3.4 % repeats and is not explained"
-    worse = f"{good}; with delay it is worse there, good to 20 %"
+    worse = f"{good}; with delay it is worse there, good to 20 %, and it stays as it is"
     assert _said("partly_explained", "delay", baseline=AFTER, best=BEFORE, worse=True) == f"{worse}; {rest}"
     chance = _said("partly_explained", "delay", baseline=AFTER, best=BEFORE)  # by no more than chance
     assert chance == f"{worse.replace('worse', 'no better')}; {rest}"

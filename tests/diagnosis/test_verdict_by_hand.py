@@ -214,11 +214,15 @@ def test_what_is_worse_on_held_out_data_explains_a_part_at_most() -> None:
 
 
 def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
-    won = Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0))
+    won = Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0), is_certain=True)
     worse = "on held-out data the extended model is worse than the baseline (0.7 to 1.1 mbar, by 40 to 80 %)"
     assert worse_of(won, "the held-out loads reach 900 N").startswith(f"{worse}: the held-out loads reach 900 N;")
     alike = "the held-out loads are like the fitted ones, so that the session or the model is wrong"
-    assert worse_of(won, None).startswith(f"{worse}: {alike};")
+    rejected = "it is rejected, so that model and calibration are the baseline's until"
+    assert worse_of(won, None).startswith(f"{worse}: {alike}; {rejected}")
+    far = replace(won, ci95=(-1234.0, -40.0))
+    assert "by 40 to 1,234 %" in worse_of(far, None)
+    assert "(0.7 to 1.1 mbar, which may be chance)" in worse_of(replace(won, is_certain=False), None)
 
 
 def test_what_is_off_elsewhere_is_said_beside_what_was_fitted_and_the_loads_that_it_is_of() -> None:

@@ -179,6 +179,8 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
               len(beside_zeros), False),
         share("an extension that makes held-out data worse", "worse", [(r, j) for r, j in cases if j in held],
               lambda j: j.worse, down=True),
+        share("an extension rejected since it would", "", [(r, j) for r, j in cases if j in held],
+              lambda j: j.rejected, down=True),
         plain("processor time, median", "median", float(np.median(cpu)) if cpu else float("nan"), "s", len(cpu), True),
         plain("processor time, worst", "worst", cpu[-1] if cpu else float("nan"), "s", len(cpu), True),
         share("a diagnosis that raised", "", cases, lambda j: j.raised, down=True),

@@ -60,6 +60,7 @@ class Judgement:
     laws: list[tuple[float, bool]] = field(default_factory=list)
     explained: float | None = None
     worse: bool = False
+    rejected: bool = False
     raised: bool = False
     said: str = ""
 
@@ -169,6 +170,7 @@ def _held_out(out: Judgement, row: Found) -> None:
     if before is None or after is None:
         return
     out.worse = after > before * (1.0 + 1e-6)
+    out.rejected = found.get("rejected") is not None
     noise, effects = row.get("noise_rmse"), row["truth"]["effects"]
     only_faults = bool(effects) and all(effect["family"] in SOFT for effect in effects)
     if noise is None or only_faults or before <= EXPLAINABLE * noise:

@@ -45,10 +45,19 @@ def test_an_extension_that_is_worse_on_faster_loads_says_so(faster: float) -> No
         assert found.verdict == "explained"
         assert found.gain.ci95[0] > 0.0
         assert not worse
+        assert found.rejected is None
     else:
         assert found.verdict == "partly_explained"
         assert found.gain.ci95[1] < 0.0
         assert "change by up to 1,600 N/s (160 in what was fitted)" in worse[0]
         assert "it is worse there" in found.says
+        assert found.rejected is not None
+        assert "rate_gain" in found.rejected.names
+        assert found.model is not None
+        assert not {"rate_gain", "gas_heat"} & {*found.model.names}
+        assert found.extended is not None
+        assert found.baseline is not None
+        assert found.extended.rmse == found.baseline.rmse
+        assert found.extended.force_rmse_n == found.baseline.force_rmse_n
         assert found.next_experiment is not None
         assert "held" in found.next_experiment.says

@@ -91,6 +91,10 @@ def test_the_held_out_share_is_of_what_noise_leaves_to_explain():
     assert one.explained == pytest.approx(1 - (0.25 - 0.16) / (1 - 0.16))
     assert not one.worse
     assert judge(row("single", [LEAK], [], "unexplained", after=1.2)).worse
+    tried = row("single", [LEAK], [], "unexplained")
+    assert not judge(tried).rejected
+    tried["found"]["rejected"] = {"effects": {}}
+    assert judge(tried).rejected
     assert judge(row("single", [effect("spikes", "noise")], [], "adequate")).explained is None
 
 

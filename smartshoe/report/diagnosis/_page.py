@@ -129,7 +129,7 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
             "of full scale: error of the simulation",
         )
     ]
-    if diagnosis.causes and not is_of_recordings:
+    if diagnosis.causes and not is_of_recordings and diagnosis.rejected is None:
         said.append(
             (
                 f"{plain(sentences.share_of_full_scale(diagnosis, after.rmse), 2)} %",

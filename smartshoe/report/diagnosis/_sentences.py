@@ -48,7 +48,8 @@ def heading(diagnosis: Diagnosis) -> str:
 def is_of_recordings(diagnosis: Diagnosis) -> bool:
     """Whether all that is named is of recordings, as a zero is, for which the plain model allows."""
     before, after = diagnosis.baseline, diagnosis.extended
-    return bool(diagnosis.causes and before and after and before.rmse == after.rmse)
+    is_as_before = before and after and before.rmse == after.rmse
+    return bool(diagnosis.causes and is_as_before and diagnosis.rejected is None)
 
 
 def how_sure(cause: Cause) -> str:
@@ -64,7 +65,7 @@ def for_this_one(cause: Cause) -> str:
 
 
 def unnamed(diagnosis: Diagnosis) -> str:
-    """The effects of the extended model that are no causes."""
+    """The effects of the extended model, adopted or rejected, that are no causes."""
     return listed(sorted(map(in_words, diagnosis.minor)), "and")
 
 
@@ -192,9 +193,14 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
     if before is None or after is None:
         return []
 
+    error = "error of the simulated reading, rms (of full scale)"
+    if diagnosis.rejected is not None and diagnosis.gain is not None:
+        tried = diagnosis.gain.rmse_after
+        with_it = f"{_of_scale(diagnosis, before, tried)}, so it is rejected"
+        return [Row(error, _of_scale(diagnosis, before, before.rmse), with_it, _change(before.rmse, tried))]
     rows = [
         Row(
-            "error of the simulated reading, rms (of full scale)",
+            error,
             _of_scale(diagnosis, before, before.rmse),
             _of_scale(diagnosis, after, after.rmse),
             _change(before.rmse, after.rmse),
@@ -237,7 +243,8 @@ def what_was_gained(diagnosis: Diagnosis) -> str:
     if not (names or others):
         return "Nothing was added."
     without = [f"without a name: {others}"] if others else []
-    added = f"Added: {'; '.join([', '.join(names), *without] if names else without)}."
+    did = "Added" if diagnosis.rejected is None else "Tried and rejected"
+    added = f"{did}: {'; '.join([', '.join(names), *without] if names else without)}."
     if is_of_recordings(diagnosis):
         return (
             f"{added} The plain model allows for what recordings have of their own, so that the error stays as it is."
