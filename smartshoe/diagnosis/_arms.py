@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL, with_usual_arm
+from smartshoe.diagnosis._baseline import USUAL, is_beyond_memory, with_usual_arm
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, fit
 from smartshoe.diagnosis._members import begun_with
 from smartshoe.diagnosis._search import BREADTH, SWAPS, additions
@@ -50,18 +50,6 @@ def with_a_usual_arm(state: State) -> State:
     found = _fits_from(starts, state, BREADTH)  # far from any fit, one linearisation does not decide
     few = dict.fromkeys((*_likeliest(_usual(found, state), state), *_likeliest(found, state)))
     return state_at(_likeliest(_usual(_at_their_end(few), state), state)[0])
-
-
-def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
-    """Whether the baseline's arm is faster or slower than all that laws remember by: it follows an effect, no wall."""
-    fastest_s, *_, slowest_s = thresholds.memory_s
-    return not fastest_s < 1.0 / model.relaxation_rate_per_s < slowest_s
-
-
-def is_stretched(model: ExtendedModel) -> bool:
-    """Whether the baseline's arm has come to a bound: no wall has such a one."""
-    share, rate = model.relaxing_share, model.relaxation_rate_per_s
-    return not (SHARE.lower < share < SHARE.upper and RATE.lower < rate < RATE.upper)
 
 
 def with_an_arm_that_creeps(state: State) -> State:

@@ -10,12 +10,14 @@ import numpy as np
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import marginal
 from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
 from smartshoe.signals.lags import lagged
 
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
 _, SHARE, RATE = BASELINE
+MOST_OF_WALL = 5.0  # share: a wall whose static gain is six times its instant one would be a dashpot
 # A resolution: a fit starts at the best. All halved or doubled, no name changed in two cases.
 POLES_PER_S = np.geomspace(RATE.lower, RATE.upper, 35)
 WALL_RATIOS = 1.02, 50.0  # bounds of any tube's
@@ -59,6 +61,18 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
 def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
     """``model`` with an arm as units have, from which a fit begins where its own is bent."""
     return replace(model, relaxing_share=USUAL.relaxing_share, relaxation_rate_per_s=USUAL.relaxation_rate_per_s)
+
+
+def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
+    """Whether the baseline's arm is faster or slower than all that laws remember by: it follows an effect, no wall."""
+    fastest_s, *_, slowest_s = thresholds.memory_s
+    return not fastest_s < 1.0 / model.relaxation_rate_per_s < slowest_s
+
+
+def is_stretched(model: ExtendedModel) -> bool:
+    """Whether the baseline's arm is one as no wall has: it follows what an effect, or another sensor, does."""
+    share, rate = model.relaxing_share, model.relaxation_rate_per_s
+    return not (SHARE.lower < share < MOST_OF_WALL and RATE.lower < rate < RATE.upper)
 
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:

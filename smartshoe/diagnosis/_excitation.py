@@ -242,8 +242,8 @@ def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: flo
     """Rates that differ by more than ``same``, and by more than ramps of so few samples tell.
 
     A ramp of n samples, each a window, lasted n +- ``ends``: half a window and half a step are open at either end, two
-    in all where each window is a step of its own. A stray ramp beside a single rate, a first one say, makes no second
-    rate.
+    in all where each window is a step of its own. One stray ramp beside a single rate, a first one say, makes no
+    second rate.
     """
     found: list[float] = []
     ramps: list[int] = []
@@ -256,4 +256,5 @@ def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: flo
             reach = rate * n / max(n - ends, 0.1)
         ramps[-1] += 1
     most = int(np.argmax(ramps)) if ramps else 0
-    return [found[most]] if ramps and ramps[most] >= (1.0 - same) * sum(ramps) else found
+    is_single = len(ramps) == 2 and sum(ramps) - ramps[most] == 1 and ramps[most] >= (1.0 - same) * sum(ramps)
+    return [found[most]] if is_single else found

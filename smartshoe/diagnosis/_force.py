@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
@@ -54,8 +56,10 @@ def compensation(
 
     To undo a lag, a gain that goes by the rate or a curve that hardly rises makes more of the reading's ``noise``, and
     of all else that is left of it. Where that is so, an effect is undone only if the force is not nearer to the load
-    without. Where the plain model's is nearer all the same, it is the one, and where it is on what is held out.
+    without. Where the plain model's is nearer all the same, it is the one, and where it is on what is held out. No
+    force is asked of samples that are clipped.
     """
+    fine = [_without_clipped(one, extended, thresholds) for one in fine]
     before, whole = force_error(fine, plain), force_error(fine, extended)
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
@@ -75,6 +79,16 @@ def compensation(
         return Compensation(plain, before, before, whole, extended.names, is_plain=True, rejected=error)
     passed_over = tuple(name for name in extended.names if name not in model.names)
     return Compensation(model, error, before, whole, passed_over)
+
+
+def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Session:
+    """``session`` but for samples that ``model`` clips by more than is tolerable: what they read tells no load."""
+    whole, usable = model.simulate(session.conditions), session.usable
+    for part in model.parts:
+        if part.effect.clips:
+            lost = whole - model.without(part.name).simulate(session.conditions)
+            usable = usable & (np.abs(lost) < thresholds.tolerable)
+    return replace(session, usable=usable)
 
 
 def force_of(found: Compensation) -> list[str]:
@@ -107,14 +121,45 @@ def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
     return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
+def as_calibrated(
+    fine: Sequence[Session], model: ExtendedModel, zero: float, error: ForceError, thresholds: Thresholds
+) -> list[str]:
+    """What is said where a calibration is clearly farther off than the ``error`` tells.
+
+    It takes one ``zero`` (share of full scale) for all recordings, and begins each as a unit that bore nothing before.
+    """
+    off_n = [_force_n(one, model, zero) - _load_n(one, model) for one in fine]
+    worst_n, name = max((_rms([off], [one.usable]), one.recording.name) for off, one in zip(off_n, fine, strict=True))
+    told_n = max(error.fitted_n, error.held_out_n, thresholds.tolerable * model.full_scale_load_n)
+    if not worst_n > thresholds.clear * told_n:
+        return []
+    return [
+        "a calibration takes one zero for all recordings, and begins each as if the unit had borne nothing before: so"
+        f" the force of {name} is off by {worst_n:.2g} N (rms), where {told_n:.2g} N is told with its own zero and past"
+        " set apart (zero the load cell and the sensor before each, and begin it with a rest)"
+    ]
+
+
 def _off_n(session: Session, model: ExtendedModel) -> Array:
     """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
-    compensator, undone = ExtendedCompensator(model, 1.0 / session.conditions.step_s), model
-    for name in compensator.not_inverted:  # what is not taken off is the offset's as far as it is one
+    undone = model
+    for name in _compensator(model, session).not_inverted:  # what is not taken off is the offset's as far as it is one
         undone = undone.without(name)
     _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
-    force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
-    return force_n - session.conditions.load * model.full_scale_load_n
+    return _force_n(session, model, own) - _load_n(session, model)
+
+
+def _compensator(model: ExtendedModel, session: Session) -> ExtendedCompensator:
+    return ExtendedCompensator(model, 1.0 / session.conditions.step_s)
+
+
+def _force_n(session: Session, model: ExtendedModel, own: Array | float) -> Array:
+    """(n,) the compensated force in N of a reading without what is ``own`` to its recording, shares of full scale."""
+    return np.asarray(_compensator(model, session).apply((session.reading - own) * model.full_scale_reading))
+
+
+def _load_n(session: Session, model: ExtendedModel) -> Array:
+    return session.conditions.load * model.full_scale_load_n
 
 
 def _rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:

@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import (
-    is_beyond_memory,
-    is_stretched,
     with_a_latency,
     with_a_usual_arm,
     with_an_arm_that_creeps,
     with_another_pole,
 )
+from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._gains_and_zeros import (
     OwnGain,
@@ -231,7 +230,12 @@ def _likeliest(
 
 
 def _is_likelier(other: _Validated, found: _Validated) -> bool:
-    """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``."""
+    """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``.
+
+    Not for one that needs an arm as no wall has, where ``found`` does without: it follows what an effect does.
+    """
+    if is_stretched(other.fit.model) and not is_stretched(found.fit.model):
+        return False
     new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
@@ -34,8 +35,8 @@ class LackOfFit:
     """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
 
     ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks; ``variance_sd`` the standard
-    deviation of its variance under noise alone. ``significant``: noise that is known by so many hardly reaches it
-    (Student's t).
+    deviation of its variance under noise alone; ``share``: of the record, in which it looks. ``significant``: noise
+    that is known by so many hardly reaches it (Student's t).
     """
 
     rms: float
@@ -43,6 +44,7 @@ class LackOfFit:
     pairs: int
     thresholds: Thresholds
     variance_sd: float = math.inf
+    share: float = 1.0
 
     @property
     def significant(self) -> bool:
@@ -50,7 +52,7 @@ class LackOfFit:
 
     def would_show(self, rms: float) -> bool:
         """Whether structure of this ``rms`` would be significant: where it would not, none is no proof of noise."""
-        return self.pairs > 1 and rms**2 > self._largest_of_noise * self.variance_sd
+        return self.pairs > 1 and self.share * rms**2 > self._largest_of_noise * self.variance_sd
 
     @property
     def _largest_of_noise(self) -> float:
@@ -59,7 +61,7 @@ class LackOfFit:
 
 def repeating(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
     """Structure that repeats from cycle to cycle: its power in each kind of cycle, over the record."""
-    power = variance = 0.0
+    power = variance = covered = 0.0
     pairs = 0
     for rows, share in repeats(sessions, residuals, thresholds.cycle):
         count = rows.shape[0]
@@ -73,20 +75,22 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
         spread = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
         power += share * mean
         variance += share**2 * spread / pair_count
+        covered += share
         pairs += pair_count
     if not pairs:
         return LackOfFit(0.0, 0.0, 0, thresholds)
     sd = max(float(np.sqrt(variance)), 1e-300)
-    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / sd, pairs, thresholds, sd)
+    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / sd, pairs, thresholds, sd, covered)
 
 
 def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: float) -> list[tuple[Array, float]]:
     """The residual over each kind of load cycle that comes back: (repeats, PLACES), while the unit is loaded.
 
-    Cycles of a kind differ by a share ``alike`` at most, in height and duration.
-    And the share of all samples that are within cycles of the kind: elsewhere nothing tells what repeats.
+    Cycles of a kind differ by a share ``alike`` at most, in height, duration and course: random loads of one height
+    repeat nothing. And the share of all samples that are within cycles of the kind: elsewhere nothing tells what
+    repeats.
     """
-    found: list[tuple[float, float, Array, int]] = []
+    found: list[_LoadCycle] = []
     total = 0
     for session, residual in zip(sessions, residuals, strict=True):
         load = session.conditions.load
@@ -102,22 +106,42 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
             usable = np.flatnonzero(session.usable[first : last + 1])
             if usable.size < 0.9 * (last + 1 - first):
                 continue
+            places = np.linspace(0, last - first, PLACES)
             # A reading at its rail is as wrong each time: of what is masked nothing is left over.
-            row = np.interp(np.linspace(0, last - first, PLACES), usable, residual[first + usable])
-            found.append((peak, (last - first) * session.conditions.step_s, row, int(last + 1 - first)))
-    kinds: list[list[tuple[float, float, Array, int]]] = []
+            row = np.interp(places, usable, residual[first + usable])
+            course = np.interp(places, usable, load[first + usable])
+            found.append(_LoadCycle(peak, (last - first) * session.conditions.step_s, course, row, last + 1 - first))
+    kinds: list[list[_LoadCycle]] = []
     for one in found:
         for kind in kinds:
-            if all(abs(a - b) <= alike * abs(b) for a, b in zip(one[:2], kind[0][:2], strict=True)):
+            if one.is_like(kind[0], alike):
                 kind.append(one)
                 break
         else:
             kinds.append([one])
     return [
-        (np.stack([row for _, _, row, _ in kind]), sum(size for *_, size in kind) / total)
+        (np.stack([one.residual for one in kind]), sum(one.size for one in kind) / total)
         for kind in kinds
         if len(kind) > 1
     ]
+
+
+class _LoadCycle(NamedTuple):
+    """``peak`` load and ``duration_s`` of what is clear of rest; its ``course`` and the ``residual`` at `PLACES`."""
+
+    peak: float
+    duration_s: float
+    course: Array
+    residual: Array
+    size: int
+
+    def is_like(self, other: _LoadCycle, alike: float) -> bool:
+        """Whether it differs from another by a share ``alike`` at most."""
+        if abs(self.peak - other.peak) > alike * abs(other.peak):
+            return False
+        if abs(self.duration_s - other.duration_s) > alike * abs(other.duration_s):
+            return False
+        return float(np.std(self.course - other.course)) <= alike * float(np.std(other.course))
 
 
 def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._arms import arms_of, is_stretched
-from smartshoe.diagnosis._baseline import RATE, WALL_RATIOS
+from smartshoe.diagnosis._arms import arms_of
+from smartshoe.diagnosis._baseline import RATE, WALL_RATIOS, is_stretched
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._held_out import Gain
@@ -133,10 +133,10 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
     )
 
 
-def end_of_range_of(model: ExtendedModel) -> str | None:
+def end_of_range_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
     """What is said of a unit that relaxes more slowly, or faster, than the ``model`` can follow, effects and all."""
     slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
-    if not (slow or fast):
+    if not (slow or fast) or apart(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable:
         return None
     return (
         f"the baseline's relaxation has come to the end of its range, {1.0 / (RATE.lower if slow else RATE.upper):g} s:"
@@ -145,14 +145,17 @@ def end_of_range_of(model: ExtendedModel) -> str | None:
 
 
 def bent_to_the_end_of(model: ExtendedModel) -> str | None:
-    """What is said of a curve that would bend farther than its equation can."""
-    ended = [part.name for part in model.parts if part.bends_too_little]
+    """What is said of effects that would be larger than their equations can."""
+    ended = [part for part in model.parts if part.is_at_bound]
     if not ended:
         return None
+    names = listed([in_words(part.name) for part in ended], "and")
+    named = f"{names} {'has come to the end of its' if len(ended) == 1 else 'have come to the end of their'} range"
+    if not any(part.effect.is_memoryless for part in ended):
+        return f"{named}: what asks for more may be another effect, so that it is half sure at most"
     return (
-        f"{listed([in_words(name) for name in ended], 'and')} has come to the end of its range: the unit bends farther"
-        " than that equation can, and what it misses may stand in the names of other effects, which are half sure at"
-        " most"
+        f"{named}: the unit bends farther than that equation can, and what it misses may stand in the names of other"
+        " effects, which are half sure at most"
     )
 
 
@@ -256,7 +259,7 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
     ]
 
 
-def own_zeros_of(zeros: OwnZeros | None, model: ExtendedModel, scale: Scale) -> list[str]:
+def own_zeros_of(zeros: OwnZeros | None, scale: Scale) -> list[str]:
     """What is said of recordings of which each has a zero of its own."""
     if zeros is None:
         return []
@@ -265,13 +268,11 @@ def own_zeros_of(zeros: OwnZeros | None, model: ExtendedModel, scale: Scale) -> 
     def told(at: int) -> str:
         share = float(zeros.offsets[at])
         of_scale = f"{100 * share:+.2g} % of full scale"
-        return f"{share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
+        return f"{scale.zero + share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
 
-    off_n = float(np.max(np.abs(zeros.offsets - zeros.mean))) / abs(model.gain) * scale.load_n
     return [
         f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: that is allowed"
-        " for here, but a calibration takes the mean of the fitted ones, so that the force of a recording may be off by"
-        f" {float(f'{off_n:.2g}'):,g} N throughout (zero the load cell and the sensor before each)"
+        " for here (zero the load cell and the sensor before each)"
     ]
 
 

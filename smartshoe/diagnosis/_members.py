@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._held_out import residual_of
@@ -46,8 +47,8 @@ class Member:
     which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
     with what another member adds, 0 where all pull against it. ``is_ended``: it lies where it turns into an effect of
     another kind. ``untold``: laws of other kinds that nothing in this data tells from it, each fitted in its place as
-    the ``laws`` are, or the free form of its branch where that follows better. ``bends_too_little``: a curve at the end
-    of its range.
+    the ``laws`` are, or the free form of its branch where that follows better. ``is_at_bound``: a strength of it lies
+    at the end of its range.
     """
 
     effect: Effect
@@ -61,12 +62,17 @@ class Member:
     likeness: float = 0.0
     is_ended: bool = False
     untold: tuple[Alternative, ...] = ()
-    bends_too_little: bool = False
+    is_at_bound: bool = False
 
     @property
     def is_any_curve(self) -> bool:
         """Whether it is a curve of no kind, whose ``laws`` are all curves; with `is_ended` all of them are one."""
         return _is_any_curve(self.effect, self.is_ended)
+
+    @property
+    def bends_too_little(self) -> bool:
+        """Whether it is a curve at the end of its range: the unit may bend farther."""
+        return self.is_at_bound and self.effect.is_memoryless
 
     @property
     def name(self) -> str:
@@ -107,7 +113,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 float(likeness[k].max()),
                 is_ended,
                 tuple(_of_kind(law, less[k], extended) for law in rivals) if is_there else (),
-                extended.model.part(one.name).bends_too_little,
+                extended.model.part(one.name).is_at_bound,
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))
@@ -157,6 +163,9 @@ def _other_laws(
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:RIVALS])
+        is_bent = is_beyond_memory(fitted.model, likelihood.thresholds) and not is_stretched(extended.model)
+        if is_bent and is_stretched(fit(likelihood, fitted.model).model):
+            continue  # an arm as no wall has follows what the law does not
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))

@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
-from smartshoe.diagnosis._force import Compensation, compensation, force_of, not_undone_of
+from smartshoe.diagnosis._force import Compensation, as_calibrated, compensation, force_of, not_undone_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
@@ -247,7 +247,8 @@ def _limits(
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
     by_wall = wall_ratio_of(extended, given.sessions, thresholds)
     undone = extended if force.is_plain else force.model
-    of_model = end_of_range_of(extended), bent_to_the_end_of(extended), by_wall
+    zero = float(np.mean(offsets(given.sessions, force.model)))
+    of_model = end_of_range_of(extended, given.sessions, thresholds), bent_to_the_end_of(extended), by_wall
     return (
         *given.limits,
         *([worse_of(won, ways)] if won.is_rejected else []),
@@ -257,7 +258,8 @@ def _limits(
         *named.limits,
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),
-        *own_zeros_of(apart, extended, given.scale),
+        *own_zeros_of(apart, given.scale),
+        *as_calibrated(given.fine, force.model, zero, force.error, thresholds),
         *zero_changes_said(found.zero_changes),
         *refusals_of(found),
     )

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.diagnosis._baseline import is_stretched
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of, past_of, residual_of
 from smartshoe.diagnosis._scale import Scale
@@ -51,18 +52,20 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
 
 @dataclass(frozen=True)
 class OwnZeros:
-    """Offsets (shares of full scale) of the recordings by their ``names``, which differ; ``mean``: of the fitted."""
+    """Offsets (shares of full scale) of the recordings by their ``names``, which differ."""
 
     names: tuple[str, ...]
     offsets: Array
-    mean: float
 
 
 def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> OwnZeros | None:
     """The zeros of all that can be used, None where they are alike but for what the model leaves of any recording.
 
-    What continues another has none: the unit brings along what it has lost or gained in that.
+    What continues another has none: the unit brings along what it has lost or gained in that. Nor can any be told
+    beside an arm as no wall has, which may take years to leave a zero.
     """
+    if is_stretched(model):
+        return None
     begun = (one for one in sessions if one.usable.any() and "continues" not in one.recording.metadata)
     there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in begun]
     if not there:
@@ -71,7 +74,7 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
     left = max(float(np.sqrt(np.mean(residual_of(one, model)[one.usable] ** 2))) for one in there)
     if np.ptp(each) <= thresholds.clear * max(thresholds.tolerable, left):
         return None
-    return OwnZeros(tuple(one.recording.name for one in there), each, float(np.mean(offsets(sessions, model))))
+    return OwnZeros(tuple(one.recording.name for one in there), each)
 
 
 def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:

@@ -18,7 +18,7 @@ from smartshoe.models.elements import Arm, Element
 
 BASELINE = (
     EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),
-    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, -0.9, 5.0, 0.1),
+    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, -0.9, 50.0, 0.1),
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
@@ -47,14 +47,13 @@ class Part:
         return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
 
     @property
-    def bends_too_little(self) -> bool:
-        """Whether it is a curve's law whose strength lies at the end of its range: the unit may bend farther.
+    def is_at_bound(self) -> bool:
+        """Whether it is a law of which a strength lies at the end of its range: the unit may do more of it, or other.
 
-        Not where its kind ends, beyond which it is any curve.
+        Not where its kind ends, beyond which it is of another.
         """
         ends = (one.is_stretched(value) for one, value in self.valued if one.null is not None and value != one.null)
-        is_law = self.effect.is_memoryless and not (self.effect.is_flexible or self.kind_ends_at)
-        return is_law and any(ends)
+        return not (self.effect.is_flexible or self.kind_ends_at) and any(ends)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,8 @@ import pytest
 from told_evidence import STANDARD
 
 from smartshoe.diagnosis import _arms, _laws, _settling
-from smartshoe.diagnosis._arms import arms_of, effect_count, is_beyond_memory, is_stretched
+from smartshoe.diagnosis._arms import arms_of, effect_count
+from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
 from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, likelier, with_laws
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.models.effects import blocks, catalogue, effect

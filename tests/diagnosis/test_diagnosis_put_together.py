@@ -116,6 +116,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         seen={},
         sizes={"linear_leak": 0.1, "delay": 0.3},
         not_undone=[],
+        as_calibrated=[],
         unproven=0.0,
         beyond=0.0,
         judged=1.0,
@@ -154,6 +155,8 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("wall_ratio_of", lambda *_: made.wall_ratio)
     answer("not_undone_of", lambda *_: list(made.not_undone))
     answer("own_zeros", None)
+    answer("offsets", np.array([0.01, 0.03]))
+    answer("as_calibrated", lambda *_: list(made.as_calibrated))
     answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N))
     answer("next_experiment", "next")
     answer("_trace", "trace")
@@ -538,6 +541,14 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
     assert parts.seen["_with_offset"][0][0] is MODEL  # the plain one's
     assert told.extended.force_rmse_n == 9.0
     assert any("so the calibration compensates by the baseline, and its twin" in limit for limit in told.limits)
+
+
+def test_what_a_calibration_gives_of_the_same_recordings_is_said(parts: Any) -> None:
+    parts.as_calibrated = ["by one zero"]
+    assert _run_diagnosis(parts).limits == ("limit", "by one zero")
+    (fine, model, zero, error, thresholds), _ = parts.seen["as_calibrated"]
+    assert (fine, zero, error, thresholds) == ([FINE], pytest.approx(0.02), EXTENDED_N, STANDARD)
+    assert model.names == parts.found.fit.model.names
 
 
 def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:

@@ -326,19 +326,22 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
 def test_of_two_sets_that_is_likelier_which_has_more_evidence_about_its_own_fit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    scores = {"a": 5.0, "b": 5.0, "c": 4.9}
+    scores, stretched = {"a": 5.0, "b": 5.0, "c": 4.9, "d": 4.9}, {"d"}
 
     def about(model: Any, evidence: Any) -> Any:
         assert evidence == "of found"  # under one noise
         return None, SimpleNamespace(score=scores[model])
 
     monkeypatch.setattr(_inference, "evidence_about", about)
+    monkeypatch.setattr(_inference, "is_stretched", lambda model: model in stretched)
 
     def judged(name: str, evidence: str = "of other") -> Any:
         return SimpleNamespace(fit=SimpleNamespace(model=name), evidence=evidence)
 
-    told = [_is_likelier(judged(other), judged("a", "of found")) for other in "abc"]
-    assert told == [False, False, True]
+    told = [_is_likelier(judged(other), judged("a", "of found")) for other in "abcd"]
+    assert told == [False, False, True, False]  # the last needs an arm as no wall has
+    stretched.add("a")
+    assert _is_likelier(judged("d"), judged("a", "of found"))
 
 
 def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -154,6 +154,20 @@ def test_the_power_of_what_repeats_and_its_score_are_those_of_written_out_sums(t
         assert turned.rms == 0.0
 
 
+def test_loads_of_one_height_and_duration_that_go_by_other_courses_repeat_nothing() -> None:
+    """What a model missed of a random load was taken for noise, since it was another in "repeats" that were none."""
+    load, cycle = _pressed(*[(60, 1.0)] * 4)
+    skewed = np.sin(np.pi * np.linspace(0.0, 1.0, 60) ** 2)
+    for number in range(4):
+        load[np.flatnonzero(cycle == number)[12:]] = skewed if number % 2 else skewed[::-1]
+    found = repeats([_session(load, cycle)], [load], ALIKE)
+    assert [rows.shape[0] for rows, _ in found] == [2, 2]
+    for rows, _ in found:
+        assert rows[1] == pytest.approx(rows[0])
+    whole = repeating([_session(load, cycle)], [load], STANDARD)
+    assert (whole.pairs, whole.share) == (2, pytest.approx(sum(share for _, share in found)))
+
+
 def test_of_many_repeats_the_sums_are_those_over_all_pairs_in_memory_for_one_each() -> None:
     count = 1000
     load, cycle = _pressed(*[(16, 1.0)] * count)
@@ -202,6 +216,9 @@ def test_structure_would_show_where_its_variance_is_beyond_students_quantile_of_
     one = LackOfFit(0.0, 0.0, pairs, STANDARD, 1e-6)
     assert not one.would_show(0.999e-3 * bound**0.5)
     assert one.would_show(1.001e-3 * bound**0.5)
+    # What is looked for in a quarter of the record must be twice as large.
+    assert not replace(one, share=0.25).would_show(1.999e-3 * bound**0.5)
+    assert replace(one, share=0.25).would_show(2.001e-3 * bound**0.5)
     assert not replace(one, pairs=1).would_show(9.0)
     assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_show(9.0)
 

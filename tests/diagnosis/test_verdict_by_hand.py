@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from told_evidence import STANDARD, ToldEvidence, candidate, worth
 
-from smartshoe.diagnosis import _inference, _zero
+from smartshoe.diagnosis import _inference, _validation, _zero
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
@@ -36,6 +36,7 @@ from smartshoe.diagnosis._validation import cancelling
 from smartshoe.diagnosis._verdict import known_error, verdict_of
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping
 from smartshoe.models.effects import effect, shift_of
+from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR, Unit, unit
 
@@ -441,6 +442,18 @@ def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
     ("rate_per_s", "said"),
     [(0.2, None), (0.01, "100 s: a unit that relaxes more slowly"), (50.0, "0.02 s: a unit that relaxes faster")],
 )
-def test_a_unit_beyond_the_range_that_can_be_followed_is_told(rate_per_s: float, said: str | None) -> None:
-    found = end_of_range_of(replace(MODEL, relaxation_rate_per_s=rate_per_s))
+def test_a_unit_beyond_the_range_that_can_be_followed_is_told(
+    monkeypatch: pytest.MonkeyPatch, rate_per_s: float, said: str | None
+) -> None:
+    step_s = 0.05
+    load = np.tile(np.repeat([0.0, 1.0], 5), 240)
+    session: Any = SimpleNamespace(
+        conditions=Conditions(step_s * np.arange(load.size), load, step_s), reading=load, fitted=load >= 0.0
+    )
+    model = replace(MODEL, relaxation_rate_per_s=rate_per_s)
+    with_own = {"residual_of": lambda one, model: one.reading - model.simulate(one.conditions)}
+    for name, stand_in in with_own.items():
+        monkeypatch.setattr(_validation, name, stand_in)
+    found = end_of_range_of(model, [session], STANDARD)
     assert (found is None) if said is None else (found is not None and said in found)
+    assert end_of_range_of(replace(model, relaxing_share=1e-4), [session], STANDARD) is None  # it relaxes by nothing

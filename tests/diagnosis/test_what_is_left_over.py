@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds, _force
-from smartshoe.diagnosis._force import ForceError, compensation, force_error, force_of, not_undone_of
+from smartshoe.diagnosis._force import ForceError, as_calibrated, compensation, force_error, force_of, not_undone_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
@@ -202,6 +202,19 @@ def test_a_force_that_is_worse_on_what_is_held_out_is_the_plain_models(
     assert found.error == (before if is_plain else extended)
     told = "baseline's on held-out data (9 to 9.3 N): the calibration compensates by the baseline"
     assert (told in str(force_of(found))) is is_plain
+
+
+def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
+    """A linear unit that is clipped at 60 % was compensated by a line through its clipped samples."""
+    lost = effect("saturation").start({"level": 0.6, "knee": 0.002})
+    lost[0] = 1.0
+    clipped = MODEL.with_part("saturation", lost)
+    seen = replace(one, reading=clipped.simulate(one.conditions))
+    bent = replace(MODEL, gain=0.8 * MODEL.gain)  # a line through all of it
+    found = compensation([seen], clipped, bent, STANDARD)
+    assert not found.is_plain
+    assert found.error.fitted_n < 0.1 * found.before.fitted_n
+    assert force_error([seen], clipped).fitted_n > 10.0 * found.error.fitted_n  # with the clipped ones
 
 
 @pytest.mark.parametrize(("more", "is_plain"), [(0.999, False), (1.001, True), (np.nan, True)])
@@ -529,23 +542,28 @@ def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_th
     moved = clean[1].with_channel(sensor.with_values(sensor.values + 0.05 * MODEL.full_scale_reading))
     sessions, scale = sessions_of(*clean)
     assert own_zeros(sessions, MODEL, STANDARD) is None
-    assert own_zeros_of(None, MODEL, scale) == []
+    assert own_zeros_of(None, scale) == []
     sessions, scale = sessions_of(clean[0], moved)
     zeros = own_zeros(sessions, MODEL, STANDARD)
     assert zeros is not None
     assert np.ptp(zeros.offsets) == pytest.approx(0.05, rel=0.05)
-    assert zeros.mean == pytest.approx(float(np.mean(zeros.offsets)), rel=0.01)
     bent = MODEL.with_part("dead_band", np.array([0.2, 0.3, 0.0]))
     assert own_zeros(sessions, bent, STANDARD) is None  # where as much is left it may be the model's error
-    (said,) = own_zeros_of(zeros, MODEL, scale)
+    (said,) = own_zeros_of(zeros, scale)
     assert "% of full scale) in triangles_1 to " in said
-    off_n = np.max(np.abs(zeros.offsets - zeros.mean)) / MODEL.gain * scale.load_n
-    assert off_n == pytest.approx(0.025 / MODEL.gain * scale.load_n, rel=0.1)
-    assert f"off by {off_n:.2g} N throughout" in said
+    read = scale.zero + float(zeros.offsets[0]) * scale.reading  # as it is logged
+    assert f"from {read:.3g} {scale.unit.symbol} (" in said
+    assert own_zeros(sessions, replace(MODEL, relaxing_share=9.0), STANDARD) is None  # no wall has such an arm
     on = replace(sessions[1], recording=replace(moved, metadata={"continues": "triangles_1"}))
     assert own_zeros([sessions[0], on], MODEL, STANDARD) is None
     assert own_zeros([on], MODEL, STANDARD) is None
     held = replace(sessions[1], held_out=np.ones_like(sessions[1].held_out))
     judged = own_zeros([sessions[0], held], MODEL, STANDARD)  # what is judged has one too, and makes no mean
     assert judged is not None
-    assert judged.mean == pytest.approx(judged.offsets[0], rel=0.01)
+    # One zero for both is off by half of what they differ by; and one recording that begins so is told.
+    mean = float(np.mean(zeros.offsets))
+    told = ForceError(0.1, np.nan)
+    (said,) = as_calibrated(sessions, MODEL, mean, told, STANDARD)
+    off_n = 0.025 / MODEL.gain * scale.load_n
+    assert float(said.split("is off by ")[1].split(" N (rms)")[0]) == pytest.approx(off_n, rel=0.2)
+    assert as_calibrated(sessions, MODEL, mean, ForceError(0.6 * off_n, np.nan), STANDARD) == []

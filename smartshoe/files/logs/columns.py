@@ -175,6 +175,19 @@ class _Assignment:
         for index, role in zip(free, guessed, strict=True):
             taken = (role == "load" and "load" in self.roles) or (role == "sensor" and sensors_chosen)
             self.roles[index] = self.roles[index] or ("auxiliary" if taken else role)
+        told = {self.roles[index] for index in columns}
+        left = [index for index in free if self.roles[index] == "auxiliary" and self._may_be_reading(index)]
+        if "load" in told and "sensor" not in told and len(left) == 1 == len(columns) - 1 and not sensors_chosen:
+            self.roles[left[0]] = "sensor"
+            self.notes.append(
+                f"Column {self.sheet.columns[left[0]].name}, the only one beside the load, is the reading."
+            )
+
+    def _may_be_reading(self, index: int) -> bool:
+        """Whether a column with samples states a unit of what a sensor gives, not of a crosshead or of the room."""
+        unit_, values = self.units[index], self.sheet.columns[index].values
+        is_given = unit_ is not None and unit_.quantity not in ("length", "temperature", "force", "time")
+        return is_given and bool(np.isfinite(values).any())
 
     def names(self, columns: Sequence[int]) -> list[str]:
         """The channels' names: the plain table's for load, command and reading, unless the file's own hold."""

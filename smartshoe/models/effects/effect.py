@@ -187,6 +187,7 @@ class Effect(ABC):
     ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
     ``between_clocks``: "lag" or "rate" where the one value of a latency is what two clocks differ by.
     ``is_leak``: True where air leaves the tube, so that an inverse sums up what is gone from the readings.
+    ``clips``: a reading that it moves tells no load any more.
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
     ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause;
     ``is_refinement`` where it follows members of other families too, and so tells no kind.
@@ -216,6 +217,7 @@ class Effect(ABC):
     shifts: ClassVar[Literal["load", "reading"] | None] = None
     between_clocks: ClassVar[Literal["lag", "rate"] | None] = None
     is_leak: ClassVar[bool] = False
+    clips: ClassVar[bool] = False
     why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False
     why_unnamed: ClassVar[str] = ""

@@ -50,6 +50,7 @@ class Saturation(Effect):
         "sensor_nonlinearity": by("peaks"),
         "wall_hardening": by("peaks"),
     }
+    clips = True
     why_not_undone = "what was clipped is lost"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

@@ -44,10 +44,10 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     if diagnosis.causes:
         _causes(console, diagnosis)
     if diagnosis.minor:
+        which = "extended" if diagnosis.rejected is None else "rejected"
         _line(
             console,
-            f"in the {'extended' if diagnosis.rejected is None else 'rejected'} model without being causes, too small or"
-            f" too unsure for a name: {unnamed(diagnosis)}",
+            f"in the {which} model without being causes, too small or too unsure for a name: {unnamed(diagnosis)}",
         )
     if diagnosis.leftover:
         _line(console, f"what is left: {diagnosis.leftover}")

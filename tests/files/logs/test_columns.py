@@ -198,3 +198,28 @@ def test_two_columns_of_one_name_are_refused_before_one_is_lost() -> None:
         Recording(RAMP, {"time": channel})
     with pytest.raises(InputError, match="two columns force_n"):
         Recording(RAMP, {"force": channel, "same": channel})
+
+
+@pytest.mark.parametrize(
+    ("header", "is_taken"),
+    [
+        ("time_s,force_n,sensor_v", True),
+        ("time_s,force_n,resistance_ohm", True),
+        ("time_s,force_n,Output (mV)", True),
+        ("time_s,force_n,displacement_mm", False),  # a machine's crosshead
+        ("time_s,force_n,room_c", False),
+        ("time_s,force_n,spare", False),  # nobody says what it is in
+        ("time_s,force_n,one_v,other_v", False),  # either
+    ],
+)
+def test_the_only_column_beside_the_load_is_the_reading(tmp_path: Path, header: str, is_taken: bool) -> None:
+    path = tmp_path / "log.csv"
+    count = len(header.split(",")) - 2
+    rows = [f"{0.01 * k:.2f},{k}" + f",{2 * k}" * count for k in range(20)]
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    found = read(path)
+    assert [one.values[3] for one in found.sensors] == ([6.0] if is_taken else [])
+    assert any("the only one beside the load, is the reading" in note for note in found.notes) is is_taken
+    if is_taken:  # what the user names is the user's to name
+        with pytest.raises(InputError):
+            read(path, sensors=["nothing"])
