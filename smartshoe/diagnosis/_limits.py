@@ -145,17 +145,14 @@ def end_of_range_of(model: ExtendedModel, sessions: Sequence[Session], threshold
 
 
 def bent_to_the_end_of(model: ExtendedModel) -> str | None:
-    """What is said of effects that would be larger than their equations can."""
-    ended = [part for part in model.parts if part.is_at_bound]
+    """What is said of a curve that would bend farther than its equation can."""
+    ended = [part.name for part in model.parts if part.bends_too_little]
     if not ended:
         return None
-    names = listed([in_words(part.name) for part in ended], "and")
-    named = f"{names} {'has come to the end of its' if len(ended) == 1 else 'have come to the end of their'} range"
-    if not any(part.effect.is_memoryless for part in ended):
-        return f"{named}: what asks for more may be another effect, so that it is half sure at most"
     return (
-        f"{named}: the unit bends farther than that equation can, and what it misses may stand in the names of other"
-        " effects, which are half sure at most"
+        f"{listed([in_words(name) for name in ended], 'and')} has come to the end of its range: the unit bends farther"
+        " than that equation can, and what it misses may stand in the names of other effects, which are half sure at"
+        " most"
     )
 
 

@@ -47,8 +47,8 @@ class Member:
     which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
     with what another member adds, 0 where all pull against it. ``is_ended``: it lies where it turns into an effect of
     another kind. ``untold``: laws of other kinds that nothing in this data tells from it, each fitted in its place as
-    the ``laws`` are, or the free form of its branch where that follows better. ``is_at_bound``: a strength of it lies
-    at the end of its range.
+    the ``laws`` are, or the free form of its branch where that follows better. ``bends_too_little``: a curve at the end
+    of its range.
     """
 
     effect: Effect
@@ -62,17 +62,12 @@ class Member:
     likeness: float = 0.0
     is_ended: bool = False
     untold: tuple[Alternative, ...] = ()
-    is_at_bound: bool = False
+    bends_too_little: bool = False
 
     @property
     def is_any_curve(self) -> bool:
         """Whether it is a curve of no kind, whose ``laws`` are all curves; with `is_ended` all of them are one."""
         return _is_any_curve(self.effect, self.is_ended)
-
-    @property
-    def bends_too_little(self) -> bool:
-        """Whether it is a curve at the end of its range: the unit may bend farther."""
-        return self.is_at_bound and self.effect.is_memoryless
 
     @property
     def name(self) -> str:
@@ -113,7 +108,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 float(likeness[k].max()),
                 is_ended,
                 tuple(_of_kind(law, less[k], extended) for law in rivals) if is_there else (),
-                extended.model.part(one.name).is_at_bound,
+                extended.model.part(one.name).bends_too_little,
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))

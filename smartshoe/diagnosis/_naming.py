@@ -52,10 +52,10 @@ def names_of(
       the kind that does most ``alone``, if it cannot be ruled out. Each is half sure at most.
 
     ``is_clocked``: peak loads grow or fall with time, so that effects that go with it imitate each other, and curves:
-    these are half sure at most. So is what is no curve and has come to the end of its own range, or stands beside a
-    curve that would bend farther than its equation can, since it may be what that misses. ``is_unsteady``: zeros change
-    at moments, of which some may not be seen and may imitate any effect: all are half sure at most. A flexible block,
-    and a curve that lies where its kind ends, is named by the law that comes nearest; no name is told twice.
+    these are half sure at most. So is what is no curve beside one that would bend farther than its equation can, since
+    it may be what that misses. ``is_unsteady``: zeros change at moments, of which some may not be seen and may imitate
+    any effect: all are half sure at most. A flexible block, and a curve that lies where its kind ends, is named by the
+    law that comes nearest; no name is told twice.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     likely = [_with_untold(name, thresholds) for name in likely]
@@ -64,7 +64,7 @@ def names_of(
         _doubted(name)
         if is_unsteady
         or (is_clocked and name.effect.goes_with_the_clock)
-        or ((is_bent or name.member.is_at_bound) and not name.member.effect.is_memoryless)
+        or (is_bent and not name.member.effect.is_memoryless)
         else name
         for name in likely
     ]

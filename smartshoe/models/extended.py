@@ -47,13 +47,14 @@ class Part:
         return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
 
     @property
-    def is_at_bound(self) -> bool:
-        """Whether it is a law of which a strength lies at the end of its range: the unit may do more of it, or other.
+    def bends_too_little(self) -> bool:
+        """Whether it is a curve's law whose strength lies at the end of its range: the unit may bend farther.
 
-        Not where its kind ends, beyond which it is of another.
+        Not where its kind ends, beyond which it is any curve.
         """
         ends = (one.is_stretched(value) for one, value in self.valued if one.null is not None and value != one.null)
-        return not (self.effect.is_flexible or self.kind_ends_at) and any(ends)
+        is_law = self.effect.is_memoryless and not (self.effect.is_flexible or self.kind_ends_at)
+        return is_law and any(ends)
 
 
 @dataclass(frozen=True, eq=False)

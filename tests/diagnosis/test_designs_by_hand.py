@@ -445,7 +445,7 @@ def _member(
     return SimpleNamespace(
         effect=effect("linear_leak"), size=size, departed=departed, alternatives=near, fall=fall,
         laws=tuple(Alternative(name, by) for name, by in laws), others_depart=others, likeness=likeness,
-        is_any_curve=False, untold=(), is_at_bound=False, bends_too_little=False,
+        is_any_curve=False, untold=(), bends_too_little=False,
     )  # fmt: skip
 
 

@@ -267,22 +267,10 @@ def test_beside_a_curve_that_would_bend_farther_than_it_can_what_is_no_curve_is_
     """What its equation misses may stand in another's name."""
     curve, leak = member("sensor_nonlinearity", size=0.07), member("linear_leak")
     assert [one.is_sure for one in names_of([curve, leak], 0.0, STANDARD)] == [True, True]
-    ended = replace(curve, is_at_bound=True)
+    ended = replace(curve, bends_too_little=True)
     beside = [one for one in names_of([ended, leak], 0.0, STANDARD) if one.member is leak]
     assert all(one.kind_probability <= 0.5 and not one.is_sure for one in beside)
     assert names_of([ended, leak], 0.0, STANDARD)[0].is_sure
-
-
-def test_what_would_be_larger_than_its_equation_can_is_half_sure_at_most() -> None:
-    """Two clocks 1 % apart were named with 0.92 of a lag that no law of the catalogue follows."""
-    curve, clock = member("sensor_nonlinearity", size=0.07), member("clock_drift")
-    for is_at_bound in (False, True):
-        names = names_of([curve, replace(clock, is_at_bound=is_at_bound)], 0.0, STANDARD)
-        assert {one.effect.name: one.is_sure for one in names} == {
-            "sensor_nonlinearity": True,
-            **({} if len(names) < 2 else {"clock_drift": not is_at_bound}),
-        }
-        assert all(one.kind_probability <= 0.5 for one in names if one.member.is_at_bound)
 
 
 @pytest.mark.parametrize(
@@ -296,15 +284,14 @@ def test_what_would_be_larger_than_its_equation_can_is_half_sure_at_most() -> No
         ("saturation", {"slope_lost": 1.0}, False),  # it holds at its level: no slope can be lost beyond all
         ("dead_band", {"lost_load": 0.3}, False),  # where its kind ends it is any curve
         ("flexible_curve", {"slope_5": -0.95}, False),  # as flat as a curve that rises may be
-        ("clock_drift", {"clock_rate_error": -0.01}, True),
-        ("clock_drift", {"clock_rate_error": 0.009}, False),
+        ("gain_drift", {"drift_rate": 1e9}, False),  # no curve
     ],
 )
-def test_an_effect_at_the_end_of_its_range_is_told(name: str, values: dict[str, float], ends: bool) -> None:
+def test_a_curve_at_the_end_of_its_range_bends_too_little(name: str, values: dict[str, float], ends: bool) -> None:
     one = effect(name)
     given = [values.get(parameter.name, value) for parameter, value in zip(one.parameters, one.start(), strict=True)]
     model = MODEL.with_part(one, given)
-    assert model.part(name).is_at_bound is ends
+    assert model.part(name).bends_too_little is ends
     said = bent_to_the_end_of(model)
     assert (said is not None) is ends
     if said is not None:
