@@ -40,7 +40,8 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         if share >= follows:
             says = (
                 f"the reading does not move with the load, though what is slow in it explains {100 * share:.0f} % of"
-                " its variance: were both recorded by one clock, and is this the unit that was pressed?"
+                f" its variance: were both recorded by one clock, is this the unit that was pressed, and does it answer"
+                f" within {max(memory_s):g} s (of a slower one record several steps of the load)?"
             )
         if _is_noise(view):
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
