@@ -121,17 +121,17 @@ def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
     return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
-def as_calibrated(
-    fine: Sequence[Session], model: ExtendedModel, zero: float, error: ForceError, thresholds: Thresholds
-) -> list[str]:
-    """What is said where a calibration is clearly farther off than the ``error`` tells.
+def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, thresholds: Thresholds) -> list[str]:
+    """What is said where a calibration is clearly farther off than errors without a recording's own tell.
 
     It takes one ``zero`` (share of full scale) for all recordings, and begins each as a unit that bore nothing before.
     """
-    off_n = [_force_n(one, model, zero) - _load_n(one, model) for one in fine]
-    worst_n, name = max((_rms([off], [one.usable]), one.recording.name) for off, one in zip(off_n, fine, strict=True))
-    told_n = max(error.fitted_n, error.held_out_n, thresholds.tolerable * model.full_scale_load_n)
-    if not worst_n > thresholds.clear * told_n:
+    there = [one for one in fine if one.usable.any()]
+    off_n = [_rms([_force_n(one, model, zero) - _load_n(one, model)], [one.usable]) for one in there]
+    worst = max(range(len(there)), key=off_n.__getitem__)
+    worst_n, name = off_n[worst], there[worst].recording.name
+    told_n = _rms([_off_n(there[worst], model)], [there[worst].usable])
+    if worst_n <= thresholds.clear * max(told_n, thresholds.tolerable * model.full_scale_load_n):
         return []
     return [
         "a calibration takes one zero for all recordings, and begins each as if the unit had borne nothing before: so"

@@ -259,7 +259,7 @@ def _limits(
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),
         *own_zeros_of(apart, given.scale),
-        *as_calibrated(given.fine, force.model, zero, force.error, thresholds),
+        *as_calibrated(given.fine, force.model, zero, thresholds),
         *zero_changes_said(found.zero_changes),
         *refusals_of(found),
     )

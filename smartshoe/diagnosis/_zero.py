@@ -62,7 +62,7 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
     """The zeros of all that can be used, None where they are alike but for what the model leaves of any recording.
 
     What continues another has none: the unit brings along what it has lost or gained in that. Nor can any be told
-    beside an arm as no wall has, which may take years to leave a zero.
+    beside an arm as no wall has: a slow one may stand for a zero.
     """
     if is_stretched(model):
         return None
