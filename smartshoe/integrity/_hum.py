@@ -51,7 +51,10 @@ def aliases(frequency_hz: float, rate_hz: float, duration_s: float) -> list[str]
 
 
 def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
-    """Frequency in Hz and amplitude (of the reading) of each spectral line, the strongest first."""
+    """Frequency in Hz and amplitude (of the reading) of each spectral line, the strongest first.
+
+    What lies beside a stronger one by less than a window over the longest rest resolves is that line, which wanders.
+    """
     if view.span == 0.0:
         return []
     stretches = _quiet_stretches(view)
@@ -59,12 +62,15 @@ def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
     if size < 128:
         return []
     residual, weight = _residual(view, bad, stretches)
+    longest = max(last - first for first, last in stretches)
+    resolved_hz = view.thresholds.clear / (longest * view.step_s)  # half the main lobe of a Hann window
     found: list[tuple[float, float]] = []
     for _ in range(view.thresholds.few):
         line = _strongest(view, residual, weight, stretches)
         if line is None:
             break
-        found.append(line[:2])
+        if all(abs(line[0] - frequency_hz) > resolved_hz for frequency_hz, _ in found):
+            found.append(line[:2])
         residual = residual - weight * line[2]
     return found
 

@@ -335,6 +335,20 @@ def test_hum_at_any_frequency_also_folded(protocol, seed, amplitude_mbar, freque
     assert said == pytest.approx(folded, abs=0.05)
 
 
+def test_one_tone_is_one_line_however_short_the_rests_are():
+    """Rests of two seconds resolve no closer than a hertz: a mains tone had stood there as three."""
+    time_s = 0.004 * np.arange(15_000)
+    load = 200.0 * np.clip(np.sin(2 * np.pi * time_s / 8.0) * 3.0, -1.0, 1.0) + 200.0
+    rng = np.random.default_rng(8)
+    tone = 0.5 * np.sin(2 * np.pi * (50.03 * time_s + 0.02 * np.sin(2 * np.pi * time_s / 20.0)))
+    reading = 0.2 * load + tone + rng.normal(0.0, 0.02, time_s.size)
+    made = Recording.from_arrays(time_s=time_s, force_n=load + rng.normal(0.0, 0.05, load.size), pressure_mbar=reading)
+    (told,) = [fault.says for fault in examine([made]).faults if fault.kind == "hum"]
+    assert "at 50.0" in told
+    assert told.count(" Hz") - told.count("Hz mains") == 1
+
+
+
 def test_names_the_mains_frequency_that_a_line_may_be():
     assert aliases(50.0, 100.0, 100.0)[0] == "50 Hz mains"
     assert aliases(40.0, 100.0, 100.0)[0] == "60 Hz mains"
