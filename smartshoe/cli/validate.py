@@ -41,4 +41,4 @@ def command(
         step("judging")
         result = validate(recordings, calibration).to_dict()
     if not emit_json(result, json_path):
-        print_validation(result)
+        print_validation(result, is_diagnosed=calibration.extended is not None)

@@ -79,8 +79,8 @@ def print_identification(result: Mapping[str, Any]) -> None:
         console.print(f"note: {note}", soft_wrap=True)
 
 
-def print_validation(result: Mapping[str, Any]) -> None:
-    """Errors per loading rate."""
+def print_validation(result: Mapping[str, Any], *, is_diagnosed: bool = False) -> None:
+    """Errors per loading rate; ``is_diagnosed``: of a diagnosis's calibration."""
     table = table_of(
         f"{result.get('unit') or 'unit'}: errors in N over {plain(result['full_scale_n'])} N; loops in % of it",
         ["rate\nN/s", "cycles", "raw", "static", "comp.", "P %", "vs\nstat. %", "loop\nraw", "loop\ncomp.",
@@ -108,19 +108,23 @@ def print_validation(result: Mapping[str, Any]) -> None:
         " P% (the paper's) compares with raw",
         soft_wrap=True,
     )
-    worse = worse_than_a_line(result["overall"])
+    worse = worse_than_a_line(result["overall"], is_diagnosed=is_diagnosed)
     if worse:
         console.print(worse, style="bold", soft_wrap=True)
 
 
-def worse_than_a_line(overall: Mapping[str, Any]) -> str | None:
-    """A sentence where the filter leaves more than the best static line does; else None."""
+def worse_than_a_line(overall: Mapping[str, Any], *, is_diagnosed: bool = False) -> str | None:
+    """A sentence where the filter leaves more than the best static line does; else None.
+
+    ``is_diagnosed``: the calibration is a diagnosis's, so that another would say nothing new.
+    """
     static_n, left_n = overall["rmse_static_n"], overall["rmse_compensated_n"]
     if static_n is None or left_n is None or left_n <= static_n:
         return None
     return (
         f"The filter makes it worse: {plain(left_n)} N are left (rms), {plain(static_n)} N by the best straight line"
-        " through the reading. Is the calibration this unit's, and is the load's sign right? If so, diagnose the unit."
+        " through the reading. Is the calibration this unit's, and is the load's sign right? If so, "
+        + ("zero the load cell and the sensor before each recording." if is_diagnosed else "diagnose the unit.")
     )
 
 

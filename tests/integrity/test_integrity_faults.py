@@ -348,7 +348,6 @@ def test_one_tone_is_one_line_however_short_the_rests_are():
     assert told.count(" Hz") - told.count("Hz mains") == 1
 
 
-
 def test_names_the_mains_frequency_that_a_line_may_be():
     assert aliases(50.0, 100.0, 100.0)[0] == "50 Hz mains"
     assert aliases(40.0, 100.0, 100.0)[0] == "60 Hz mains"

@@ -13,6 +13,7 @@ from pages_made import NAME, RATES, calibration_page, two_units
 
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, headline, judge, write_page
 from smartshoe.report.calibration._judgement import against_static, looks_like_friction
+from smartshoe.report.tables import worse_than_a_line
 
 
 @pytest.fixture(scope="module")
@@ -138,3 +139,14 @@ def test_on_paper_the_verdict_stands_on_the_first_sheet_in_light(browser: Browse
     pdf = browser.paper()
     assert 1 <= len(re.findall(rb"/Type\s*/Page\b", pdf)) <= 6
     assert browser.faults() == []
+
+
+@pytest.mark.parametrize(
+    ("is_diagnosed", "said"),
+    [(False, "If so, diagnose the unit."), (True, "If so, zero the load cell and the sensor before each recording.")],
+)
+def test_of_a_calibration_that_a_diagnosis_made_no_diagnosis_is_asked_for(is_diagnosed: bool, said: str) -> None:
+    told = worse_than_a_line({"rmse_static_n": 1.0, "rmse_compensated_n": 2.0}, is_diagnosed=is_diagnosed)
+    assert told is not None
+    assert told.endswith(said)
+    assert worse_than_a_line({"rmse_static_n": 2.0, "rmse_compensated_n": 1.0}, is_diagnosed=is_diagnosed) is None
