@@ -62,6 +62,19 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
     return roles
 
 
+def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> int | None:
+    """The auxiliary channel that is the only one beside a load, if it states a unit of what a sensor gives.
+
+    Not one of a crosshead or of the room.
+    """
+    left = [index for index, role in enumerate(roles) if role != "load"]
+    if len(roles) != 2 or len(left) != 1 or roles[left[0]] != "auxiliary":
+        return None
+    unit_ = units[left[0]]
+    is_sensors = unit_ is not None and unit_.quantity not in ("length", "temperature", "force", "time")
+    return left[0] if is_sensors else None
+
+
 def _rename(
     names: list[str], roles: Sequence[Role], units: Sequence[Unit], is_declared: Sequence[bool], has_header: bool
 ) -> None:
@@ -175,19 +188,12 @@ class _Assignment:
         for index, role in zip(free, guessed, strict=True):
             taken = (role == "load" and "load" in self.roles) or (role == "sensor" and sensors_chosen)
             self.roles[index] = self.roles[index] or ("auxiliary" if taken else role)
-        told = {self.roles[index] for index in columns}
-        left = [index for index in free if self.roles[index] == "auxiliary" and self._may_be_reading(index)]
-        if "load" in told and "sensor" not in told and len(left) == 1 == len(columns) - 1 and not sensors_chosen:
-            self.roles[left[0]] = "sensor"
-            self.notes.append(
-                f"Column {self.sheet.columns[left[0]].name}, the only one beside the load, is the reading."
-            )
-
-    def _may_be_reading(self, index: int) -> bool:
-        """Whether a column with samples states a unit of what a sensor gives, not of a crosshead or of the room."""
-        unit_, values = self.units[index], self.sheet.columns[index].values
-        is_given = unit_ is not None and unit_.quantity not in ("length", "temperature", "force", "time")
-        return is_given and bool(np.isfinite(values).any())
+        only = only_reading([self.roles[index] for index in columns], [self.units[index] for index in columns])
+        if only is not None and not sensors_chosen:
+            column = self.sheet.columns[columns[only]]
+            if column.role is None and np.isfinite(column.values).any():
+                self.roles[columns[only]] = "sensor"
+                self.notes.append(f"Column {column.name}, the only one beside the load, is the reading.")
 
     def names(self, columns: Sequence[int]) -> list[str]:
         """The channels' names: the plain table's for load, command and reading, unless the file's own hold."""
@@ -290,4 +296,4 @@ def recording_from(
     )
 
 
-__all__ = ["is_negative", "recording_from", "roles_of"]
+__all__ = ["is_negative", "only_reading", "recording_from", "roles_of"]

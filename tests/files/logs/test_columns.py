@@ -8,7 +8,8 @@ import pytest
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.files.logs import Column, Sheet, read, write
 from smartshoe.files.logs.columns import recording_from
-from smartshoe.recording import Recording
+from smartshoe.recording import Channel, Recording, Role
+from smartshoe.units import unit
 
 RAMP = np.array([0.0, 1.0, 2.0])
 
@@ -223,3 +224,18 @@ def test_the_only_column_beside_the_load_is_the_reading(tmp_path: Path, header: 
     if is_taken:  # what the user names is the user's to name
         with pytest.raises(InputError):
             read(path, sensors=["nothing"])
+
+
+@pytest.mark.parametrize("ending", ["csv", "lvm", "tdms", "mat", "h5"])
+@pytest.mark.parametrize("role", ["auxiliary", "sensor"])
+def test_what_a_file_says_of_its_only_other_column_stays(tmp_path: Path, ending: str, role: Role) -> None:
+    """What is read along is no reading because it was written beside a load alone."""
+    channels = [
+        Channel.from_values("force", RAMP, unit("N"), "load"),
+        Channel.from_values("voltage", 2.0 * RAMP, unit("V"), role),
+    ]
+    written = Recording(RAMP, {one.name: one for one in channels}, name="log")
+    write(written, tmp_path / f"log.{ending}")
+    again = read(tmp_path / f"log.{ending}")
+    assert roles(again) == {"force": "load", "voltage": role}
+    assert again.notes == ()

@@ -19,7 +19,7 @@ from smartshoe.files.logs._moments import is_moment
 from smartshoe.files.logs._numbers import is_missing, numbers_of
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import head_lines, is_text, plain_title, read_lines
-from smartshoe.files.logs.columns import roles_of
+from smartshoe.files.logs.columns import only_reading, roles_of
 from smartshoe.recording import Channel, Recording, Role, column_name, split_column
 from smartshoe.units import declared, find_unit
 
@@ -232,11 +232,13 @@ def write(recording: Recording, path: Path) -> None:
     # The reader tells roles and units from the names as they will stand in the header.
     split = [(c.name, c.unit) if _is_foreign(c) else split_column(column_name(c)) for c in channels]
     lines += [(f"unit {column_name(channel)}", channel.unit.symbol) for channel in channels if _is_foreign(channel)]
-    roles = roles_of([name for name, _ in split], [unit for _, unit in split])
+    units = [unit for _, unit in split]
+    roles = roles_of([name for name, _ in split], units)
+    only = only_reading(roles, units)  # it would be the reading if nothing said what it is
     lines += [
         (f"role {column_name(channel)}", channel.role)
-        for channel, role in zip(channels, roles, strict=True)
-        if channel.role != role
+        for at, (channel, role) in enumerate(zip(channels, roles, strict=True))
+        if channel.role != role or at == only
     ]
     lines += [("note", note) for note in recording.notes]
     with path.open("w", encoding="utf-8", newline="\n") as file:
