@@ -255,6 +255,6 @@ def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: flo
             ramps.append(0)
             reach = rate * n / max(n - ends, 0.1)
         ramps[-1] += 1
-    most = int(np.argmax(ramps)) if ramps else 0
-    is_single = len(ramps) == 2 and sum(ramps) - ramps[most] == 1 and ramps[most] >= (1.0 - same) * sum(ramps)
-    return [found[most]] if is_single else found
+    most = max(ramps, default=0)
+    is_single = sum(ramps) - most == 1 and most >= (1.0 - same) * sum(ramps)
+    return [found[ramps.index(most)]] if is_single else found

@@ -127,7 +127,7 @@ def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, th
     It takes one ``zero`` (share of full scale) for all recordings, and begins each as a unit that bore nothing before.
     """
     there = [one for one in fine if one.usable.any()]
-    off_n = [_rms([_force_n(one, model, zero) - _load_n(one, model)], [one.usable]) for one in there]
+    off_n = [_rms([_off_by_n(one, model, _compensator(model, one), zero)], [one.usable]) for one in there]
     worst = max(range(len(there)), key=off_n.__getitem__)
     worst_n, name = off_n[worst], there[worst].recording.name
     told_n = _rms([_off_n(there[worst], model)], [there[worst].usable])
@@ -142,24 +142,21 @@ def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, th
 
 def _off_n(session: Session, model: ExtendedModel) -> Array:
     """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
-    undone = model
-    for name in _compensator(model, session).not_inverted:  # what is not taken off is the offset's as far as it is one
+    compensator, undone = _compensator(model, session), model
+    for name in compensator.not_inverted:  # what is not taken off is the offset's as far as it is one
         undone = undone.without(name)
     _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
-    return _force_n(session, model, own) - _load_n(session, model)
+    return _off_by_n(session, model, compensator, own)
 
 
 def _compensator(model: ExtendedModel, session: Session) -> ExtendedCompensator:
     return ExtendedCompensator(model, 1.0 / session.conditions.step_s)
 
 
-def _force_n(session: Session, model: ExtendedModel, own: Array | float) -> Array:
-    """(n,) the compensated force in N of a reading without what is ``own`` to its recording, shares of full scale."""
-    return np.asarray(_compensator(model, session).apply((session.reading - own) * model.full_scale_reading))
-
-
-def _load_n(session: Session, model: ExtendedModel) -> Array:
-    return session.conditions.load * model.full_scale_load_n
+def _off_by_n(session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float) -> Array:
+    """(n,) compensated force less load in N of a reading without what is ``own`` to it, shares of full scale."""
+    force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
+    return np.asarray(force_n - session.conditions.load * model.full_scale_load_n)
 
 
 def _rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:

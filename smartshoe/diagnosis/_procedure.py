@@ -70,10 +70,8 @@ def diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     left = _left_by(found, given, integrity.faults)
-    # At the full rate: thinning makes noise of neighbours alike.
-    before, off = ([residual_of(one, fit.model) for one in fine] for fit in (found.baseline, found.fit))
-    plain = replace(found.baseline.model, noise=fitted_rms(fine, before))
-    extended = replace(found.fit.model, noise=fitted_rms(fine, off))
+    plain = replace(found.baseline.model, noise=fitted_rms(fine, left.off_before))
+    extended = replace(found.fit.model, noise=fitted_rms(fine, left.off_after))
     baseline, best = errors(fine, plain), errors(fine, extended)
     named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
@@ -82,9 +80,9 @@ def diagnosed(
     causes += [zero_cause_of(zero, best, scale, thresholds, apart is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
-    outcome = _outcome(found, given, left, off, named, causes, won)
+    outcome = _outcome(found, given, left, named, causes, won)
     verdict, rest = outcome.verdict, unexplained_of(causes, left.before, left.after)
-    of_held_out = left_where_judged(fine, off, thresholds)
+    of_held_out = left_where_judged(fine, left.off_after, thresholds)
     # No more is noise than is no structure, and than what was fitted holds beside its own: what a model does not
     # foresee elsewhere is none for that. What is white there is noise in any case.
     structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
@@ -158,13 +156,16 @@ class _Adopted:
 class _LeftOver:
     """What the plain model leaves ``before`` effects and the extended one ``after``; ``within`` what was fitted.
 
-    ``known``: rms that faults of the data add to it, a share of full scale.
+    ``known``: rms that faults of the data add to it, a share of full scale. ``off_before`` and ``off_after``: residuals
+    (n,) of each recording at the full rate, since thinning makes noise of neighbours alike.
     """
 
     before: ResidualStructure
     after: ResidualStructure
     within: ResidualStructure
     known: float
+    off_before: Sequence[Array]
+    off_after: Sequence[Array]
 
 
 def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _LeftOver:
@@ -173,7 +174,8 @@ def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> 
     plain, residuals = ([residual_of(one, model) for one in sessions] for model in models)
     before, after = (residual_structure(sessions, one, thresholds) for one in (plain, residuals))
     within = _left_of_what_was_fitted(sessions, residuals, thresholds)
-    return _LeftOver(before, after, within, known_error(faults, sessions, given.scale))
+    off = ([residual_of(one, model) for one in given.fine] for model in models)
+    return _LeftOver(before, after, within, known_error(faults, sessions, given.scale), *off)
 
 
 def _is_silent(found: Inference, given: Prepared) -> bool:
@@ -205,19 +207,18 @@ def _outcome(
     found: Inference,
     given: Prepared,
     left: _LeftOver,
-    off: Sequence[Array],
     named: Chosen,
     causes: Sequence[Cause],
     won: Gain,
 ) -> _Outcome:
-    """The verdict, by what is ``left``, and ``off`` at the full rate, (n,) each, and ``won`` on what is held out."""
-    fine, known, thresholds = given.fine, left.known, given.thresholds
+    """The verdict, by what is ``left``, and ``won`` on what is held out."""
+    fine, off, known, thresholds = given.fine, left.off_after, left.known, given.thresholds
     within = max(left.within.size, beyond_noise(fine, off, thresholds), known)
     elsewhere = off_elsewhere(fine, off, within, thresholds)
     unproven = 0.0
     if not (found.can_validate and left.after.is_tested):
         # Beside causes what is left is weighed against what was wrong, tested or not.
-        before = [residual_of(one, found.baseline.model) for one in fine] if found.can_validate and causes else None
+        before = left.off_before if found.can_validate and causes else None
         unproven = not_shown_to_be_noise(fine, off, left.after, thresholds, known, before)
     if given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         return _Outcome("unexplained", won, elsewhere, unproven)
