@@ -34,23 +34,30 @@ class Contest:
 
     @property
     def log_odds(self) -> float:
+        return self._log_odds_of(self.margin)
+
+    def _log_odds_of(self, margin: float) -> float:
         fall = self.without.cost - self.cause.cost
-        return -math.log(max(float(odds_of_law(self.margin, fall, self.cause.likelihood.thresholds)), 1e-300))
+        return -math.log(max(float(odds_of_law(margin, fall, self.cause.likelihood.thresholds)), 1e-300))
 
     def settled(self) -> Contest:
         """The same, the rival fitted on, as `after` does: so far only as a comparison of many asks for."""
         return replace(self, rival=fit(self.cause.likelihood, self.rival.model, FEW_STEPS))
 
-    def after(self, protocol: Protocol, sample_time_s: float, least: float = -math.inf) -> Contest | None:
+    def after(
+        self, protocol: Protocol, sample_time_s: float, least: float = -math.inf, of_use: float = -math.inf
+    ) -> Contest | None:
         """The same were the protocol run once, logged every ``sample_time_s``, and the cause as it was fitted true.
 
         The rival is fitted on to this data and that, the new recording's own offset and past free; what is without
-        either begins from the cause, as in a diagnosis. None where the margin grows by no more than ``least``: by what
-        the rival misses of that recording as it is it cannot, however it is fitted on.
+        either begins from the cause, as in a diagnosis. None where the margin grows by no more than ``least``, or the
+        log odds come to no more than ``of_use``: however the rival is fitted on, it misses no more of that recording
+        than it does as it is, and what is without either falls behind by no less than now.
         """
         known, model = self.cause.likelihood, self.cause.model
         session = _foretold(model, protocol, sample_time_s, known.thresholds)
-        if Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model) <= least:
+        missed = Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model)
+        if missed <= least or self._log_odds_of(self.margin + missed) <= of_use:
             return None
         both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
         cause = weighed(both, model)

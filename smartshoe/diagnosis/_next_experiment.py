@@ -92,9 +92,10 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     held = now.cause.likelihood.sessions
     left = [one for one in seen if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
     no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
+    of_use = min(thresholds.clear * now.log_odds, _ruled_out_at(thresholds))
     foretold: list[tuple[Protocol, Contest]] = []
     for protocol in sorted(left, key=lambda one: one.duration_s):
-        then = now.after(protocol, least_s, no_name)
+        then = now.after(protocol, least_s, no_name, of_use)
         if then is not None:
             foretold.append((protocol, then))
             if _rules_out(then, thresholds):
@@ -119,7 +120,12 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
 
 def _rules_out(contest: Contest, thresholds: Thresholds) -> bool:
     """Whether the rival would be no equivalent any more."""
-    return contest.log_odds >= -math.log(thresholds.equivalent_odds)
+    return contest.log_odds >= _ruled_out_at(thresholds)
+
+
+def _ruled_out_at(thresholds: Thresholds) -> float:
+    """The log odds from which on a rival is no equivalent."""
+    return -math.log(thresholds.equivalent_odds)
 
 
 def _most_telling(

@@ -244,8 +244,9 @@ class _Foretold:
         self.cause = SimpleNamespace(likelihood=SimpleNamespace(sessions=()))
         self.asked: list[str] = []
 
-    def after(self, protocol: Any, sample_time_s: float, least: float) -> _Foretold | None:
+    def after(self, protocol: Any, sample_time_s: float, least: float, of_use: float) -> _Foretold | None:
         assert sample_time_s == 0.005  # of the recording that was logged most quickly
+        assert of_use == min(2.0 * self.log_odds, ENDS)  # what comes to no more is never proposed
         self.asked.append(protocol.name)
         then = _Foretold(*self._then.get(protocol.name, (self.log_odds, self.margin)))
         return then if then.margin - self.margin > least else None

@@ -248,6 +248,14 @@ def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     for name in ("steps", "idle"):  # whatever the rival were fitted to, it cannot miss more than it does as it is
         before = Contest(lag, lag, now.without).after(EXPERIMENTS[name](800.0), 0.02, 1.0)
         assert before is None
+    for made in EXPERIMENTS.values():  # what is passed over by its bound would not have come as far
+        then = now.after(made(800.0), 0.02)
+        assert now.after(made(800.0), 0.02, of_use=0.999 * then.log_odds) is not None
+    alike = Contest(lag, fit(likelihood, lag.model.with_part(effect("zero_drift")), 1), now.without)
+    for made in EXPERIMENTS.values():
+        most = alike.after(made(800.0), 0.02).log_odds
+        assert alike.after(made(800.0), 0.02, of_use=1.0) is None
+        assert most < 1.0
 
 
 def test_units_of_the_scale_are_the_readings() -> None:
