@@ -57,6 +57,7 @@ class ExtendedCompensator(ForceFilter):
         self._passed_over: dict[str, str] = {}
         self._noise = model.noise / model.gain  # of the signal, as far as it is undone
         leaks = (part for part in model.parts if part.effect.is_leak)
+        self._moved: dict[str, float] = {}
         self._cautions = {part.name: LEAK_CAUTION for part in leaks if not part.effect.is_null(part.values)}
         for part in reversed(model.chain):
             if part is None:
@@ -66,6 +67,7 @@ class ExtendedCompensator(ForceFilter):
         self.blocks = tuple(self._blocks)
         self.not_inverted = MappingProxyType(self._passed_over)
         self.cautions = MappingProxyType(self._cautions)
+        self.moved_in_an_hour = MappingProxyType(self._moved)
         self.reset()
 
     def _undo(self, part: Part) -> None:
@@ -79,6 +81,7 @@ class ExtendedCompensator(ForceFilter):
         self._blocks.append((part.name, inverse))
         moved = _moved_by_the_clock(inverse, self.started_s)
         if moved:
+            self._moved[part.name] = moved
             self._cautions[part.name] = (
                 "it goes on with the clock from the first reading on, however short the recordings were that it was"
                 f" fitted to: an hour later it moves a full-scale force by {significant(100.0 * moved, 2)} %; reset the"

@@ -24,7 +24,8 @@ class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
     ``present`` holds the words of `Effect.exposed_by` that apply. ``is_judged``: what is held out can be used.
-    ``is_cycled``: a recording that is fitted has more than one load cycle.
+    ``is_cycled``: a recording that is fitted has more than one load cycle. ``is_unread_at_rest``: it rests without
+    load, and no reading there can be used.
     """
 
     rates_per_s: tuple[float, ...]
@@ -34,6 +35,7 @@ class Excitation:
     thresholds: Thresholds
     is_judged: bool = True
     is_cycled: bool = True
+    is_unread_at_rest: bool = False
 
     def shows(self, effect: Effect) -> bool:
         """Whether this data holds any of what shows an effect.
@@ -74,10 +76,12 @@ class Excitation:
                 " creep is not seen"
             )
         if "rests" not in self.present:
-            said.append(
-                "the unit is never seen at rest without load: zero, tare and what lies near zero load are told by the"
-                " model alone"
+            why = (
+                "no reading of the unit at rest without load can be used (see the faults of the data)"
+                if self.is_unread_at_rest
+                else "the unit is never seen at rest without load"
             )
+            said.append(f"{why}: zero, tare and what lies near zero load are told by the model alone")
         if self.goes_with_the_clock:
             said.append(
                 "peak loads grow, or fall, with time, so that a drift, a leak or a set can look like a curve of reading"
@@ -123,7 +127,8 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
     is_cycled = have_later_cycles(sessions, thresholds)
-    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled)
+    is_unread = idle_s >= thresholds.settled_s and not found["rests"]
+    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled, is_unread)
 
 
 class _Rise(NamedTuple):

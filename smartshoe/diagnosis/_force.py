@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import listed
+from smartshoe.models.effects import in_words, listed
 from smartshoe.models.extended import ExtendedModel
 
 
@@ -121,10 +121,30 @@ def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
     return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
+def going_on_of(
+    model: ExtendedModel, fine: Sequence[Session], named: Collection[str], thresholds: Thresholds
+) -> list[str]:
+    """What is said of effects that are not ``named`` and that a calibration takes off by the clock, on and on."""
+    moved = _compensator(model, fine[0]).moved_in_an_hour
+    said = [
+        f"{in_words(name)} by {100.0 * share:+.2g} %"
+        for name, share in moved.items()
+        if name not in named and abs(share) > thresholds.standing
+    ]
+    if not said:
+        return []
+    return [
+        "the calibration takes off by the clock what has no name here, and goes on with it: an hour on, beyond all that"
+        f" was recorded, it moves a full-scale force ({', '.join(said)}); reset it where a session begins, and fit a"
+        " recording as long as its sessions are to be"
+    ]
+
+
 def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, thresholds: Thresholds) -> list[str]:
     """What is said where a calibration is clearly farther off than errors without a recording's own tell.
 
-    It takes one ``zero`` (share of full scale) for all recordings, and begins each as a unit that bore nothing before.
+    It takes one ``zero`` (share of full scale) for all recordings, that of what it undoes, and begins each as a unit
+    that bore nothing before.
     """
     there = [one for one in fine if one.usable.any()]
     off_n = [_rms([_off_by_n(one, model, _compensator(model, one), zero)], [one.usable]) for one in there]
@@ -142,11 +162,21 @@ def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, th
 
 def _off_n(session: Session, model: ExtendedModel) -> Array:
     """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
-    compensator, undone = _compensator(model, session), model
-    for name in compensator.not_inverted:  # what is not taken off is the offset's as far as it is one
-        undone = undone.without(name)
+    compensator = _compensator(model, session)
+    undone = _without(model, compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
     _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
     return _off_by_n(session, model, compensator, own)
+
+
+def undone_of(model: ExtendedModel, session: Session) -> ExtendedModel:
+    """What of a model a compensator at the rate of a session undoes."""
+    return _without(model, _compensator(model, session).not_inverted)
+
+
+def _without(model: ExtendedModel, names: Iterable[str]) -> ExtendedModel:
+    for name in names:
+        model = model.without(name)
+    return model
 
 
 def _compensator(model: ExtendedModel, session: Session) -> ExtendedCompensator:

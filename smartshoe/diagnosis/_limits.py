@@ -226,7 +226,7 @@ def led_back_of(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
         )
     return (
         f"led back to no load from {100 * zero.led_from:.2g} % of it, {stands} does below such loads, or remembers of"
-        " those before, of which this data shows nothing (record a rest without load)"
+        " those before, of which this data shows nothing (record a rest without load that the sensor can read)"
     )
 
 

@@ -10,7 +10,15 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
-from smartshoe.diagnosis._force import Compensation, as_calibrated, compensation, force_of, not_undone_of
+from smartshoe.diagnosis._force import (
+    Compensation,
+    as_calibrated,
+    compensation,
+    force_of,
+    going_on_of,
+    not_undone_of,
+    undone_of,
+)
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
@@ -99,6 +107,10 @@ def diagnosed(
         adopted = _Adopted(found.baseline, plain, baseline, left.before)
     parameters, covariance = joint_parameters(adopted.fit, scale)
     force = compensation(fine, adopted.model, plain, thresholds)
+    # What no compensator takes off, be it the room's warmth, is its zero's, on the mean of the recordings.
+    undone = undone_of(force.model, fine[0])
+    zeros_apart = abs(_mean_offset(sessions, undone) - _mean_offset(sessions, force.model))
+    has_own = bool(force.passed_over) or zeros_apart >= thresholds.material
     says = sentence_of(
         verdict,
         names_in(causes, len(minor)),
@@ -134,7 +146,7 @@ def diagnosed(
         model=_with_offset(adopted.model, named.zeros, sessions, scale),
         rejected=extended if won.is_rejected else None,
         baseline_model=plain,
-        force_model=_with_offset(force.model, named.zeros, sessions, scale) if force.passed_over else None,
+        force_model=_with_offset(force.model, named.zeros, sessions, scale, undone) if has_own else None,
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, plain, extended, scale) for session in fine),
@@ -248,7 +260,8 @@ def _limits(
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
     by_wall = wall_ratio_of(extended, given.sessions, thresholds)
     undone = extended if force.is_plain else force.model
-    zero = float(np.mean(offsets(given.sessions, force.model)))
+    zero = _mean_offset(given.sessions, undone_of(force.model, given.fine[0]))
+    of_causes = {one.member.name for one in named.names}
     of_model = end_of_range_of(extended, given.sessions, thresholds), bent_to_the_end_of(extended), by_wall
     return (
         *given.limits,
@@ -256,6 +269,7 @@ def _limits(
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
         *force_of(force),
         *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
+        *([] if force.is_plain else going_on_of(force.model, given.fine, of_causes, thresholds)),
         *named.limits,
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),
@@ -296,19 +310,30 @@ def _percent_less(after: float, before: float) -> float:
 
 
 def _with_offset(
-    model: ExtendedModel, zeros: Sequence[Zero], sessions: Sequence[Session], scale: Scale
+    model: ExtendedModel,
+    zeros: Sequence[Zero],
+    sessions: Sequence[Session],
+    scale: Scale,
+    undone: ExtendedModel | None = None,
 ) -> ExtendedModel:
     """``model`` with the recordings' mean offset, so that it gives readings as they are logged.
 
     Also where one is named: at the rest that shows it the ``model`` may be off by some of what it misses elsewhere.
+    Where it is to be ``undone`` in part, the offset beside that part.
     """
-    for zero in zeros:
-        if zero.effect.shifts == "load":
-            model = model.with_part(zero.effect, np.array([zero.value]))
-    offset = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
+    tares = [(zero.effect, np.array([zero.value])) for zero in zeros if zero.effect.shifts == "load"]
+    of = undone or model
+    for tare in tares:
+        model, of = model.with_part(*tare), of.with_part(*tare)
+    offset = _mean_offset(sessions, of) + scale.zero / scale.reading
     if offset == 0.0:
         return model
     return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the chain's end multiplies it
+
+
+def _mean_offset(sessions: Sequence[Session], model: ExtendedModel) -> float:
+    """The recordings' mean offset under ``model``, a share of full scale."""
+    return float(np.mean(offsets(sessions, model)))
 
 
 def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:

@@ -50,11 +50,18 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     if not _is_known(view, bottom) and (hidden <= least or not _noise_stands_still(view, tied, bottom, 1.0)):
         return
     on = tied & (view.load.values > view.curve[0][0] + view.thresholds.standing * view.load_span)
+    # The load at which readings leave the rail; where load and reading have changed places there is none.
+    starts, stops = runs_of(tied)
+    size = stops - starts
+    leaves_n = float(np.median(view.load.values[stops[size >= min(view.thresholds.few, size.max())] - 1]))
+    cut_off = "its zero is cut off" + (
+        "" if view.is_swapped else f", and loads below about {leaves_n:.2g} N are not seen"
+    )
     yield Finding(
         "low_rail",
         view.whole(on),
         f"{int(on.sum())} readings are exactly {view.sign * bottom:.6g} {view.recording.sensor.unit.symbol} while the"
-        " load is on: the sensor cannot go lower, and its zero is cut off",
+        f" load is on: the sensor cannot go lower, so that {cut_off}",
         masks=True,
         cut_off=view.whole(tied & ~on),
         rail=view.sign * bottom,

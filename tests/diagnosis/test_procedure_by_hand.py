@@ -507,3 +507,8 @@ def test_a_model_gives_readings_as_they_are_logged() -> None:
     assert second.name == shift_of("reading").name
     nothing = replace(SCALE, zero=-mean * SCALE.reading)
     assert _with_offset(MODEL, (), [session], nothing).parts == ()
+    # What is not undone stays in the model, and its zero in that of what is.
+    drifting = MODEL.with_part("zero_drift", np.array([1e-3, 0.0, 0.0, 1.0]))
+    first, second = _with_offset(drifting, (), [session], SCALE, MODEL).parts
+    assert (first.name, second.values) == ("zero_drift", pytest.approx(part))
+    assert _with_offset(drifting, (), [session], SCALE).parts[1].values != pytest.approx(part)

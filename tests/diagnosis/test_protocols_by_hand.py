@@ -407,6 +407,7 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
         ({"rates_per_s": (0.1,)}, "one loading rate only"),
         ({"present": every - {"holds"}}, "no hold longer than 3 s under load"),
         ({"present": every - {"rests"}}, "never seen at rest without load"),
+        ({"present": every - {"rests"}, "is_unread_at_rest": True}, "no reading of the unit at rest without load can"),
         ({"present": every - {"repeats"}}, "no load cycle is repeated"),
         ({"peaks": (1.0,)}, "one peak load only"),
     ):

@@ -324,6 +324,38 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
     assert tried == [(law.name, [shapes[2], shapes[0]])]
 
 
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_a_law_that_goes_on_to_an_arm_as_no_wall_has_is_weighed_beside_the_arm_that_was_found(
+    monkeypatch: pytest.MonkeyPatch, goes_on: bool
+) -> None:
+    """It follows by the arm what it does not follow itself; but what the block follows it may follow all the same."""
+    law, values = effect("sensor_lag"), np.array([0.03, 0.1])
+    bent = replace(MODEL, relaxation_rate_per_s=0.02).with_part(law, values)
+    fits: list[Any] = []
+
+    def refitted(likelihood: Any, model: Any, steps: Any = None, only: Any = None) -> Any:
+        fits.append((model, only))
+        end = replace(model, relaxing_share=9.0) if only is None and goes_on else model
+        return SimpleNamespace(cost=130.0 if only else 40.0, model=end)
+
+    monkeypatch.setattr(_members, "fit_with", lambda *_: SimpleNamespace(cost=50.0, model=bent))
+    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
+    monkeypatch.setattr(_members, "fit", refitted)
+    kept = MODEL.with_part("gain_drift")
+    less: Any = SimpleNamespace(model=kept, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
+    extended: Any = SimpleNamespace(cost=100.0, model=kept.with_part("delay", np.array([0.02])))
+    one: Any = SimpleNamespace(name="delay", effect=effect("delay"))
+    (other,) = _other_laws(one, less, extended, {}, is_ended=False)
+    if not goes_on:
+        assert (other.margin, len(fits)) == (-50.0, 1)
+        return
+    (_, (model, only)) = fits
+    assert (other.margin, only) == (30.0, law.name)
+    assert model.names == ("gain_drift", "sensor_lag")
+    assert (model.relaxing_share, model.relaxation_rate_per_s) == (MODEL.relaxing_share, MODEL.relaxation_rate_per_s)
+    assert model.part("sensor_lag").values == pytest.approx(values)
+
+
 # -- folds ------------------------------------------------------------------------------------------------------------
 def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blocks() -> None:
     one, two, none = (session_of(WAVE, np.full(240, bool(k))) for k in (1, 1, 0))

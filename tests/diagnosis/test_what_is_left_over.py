@@ -14,7 +14,16 @@ from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds, _force
-from smartshoe.diagnosis._force import ForceError, as_calibrated, compensation, force_error, force_of, not_undone_of
+from smartshoe.diagnosis._force import (
+    ForceError,
+    as_calibrated,
+    compensation,
+    force_error,
+    force_of,
+    going_on_of,
+    not_undone_of,
+    undone_of,
+)
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
@@ -235,6 +244,23 @@ def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
     (said,) = not_undone_of(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
     assert said.startswith("no compensator takes off the clock drift, since ")
     assert not_undone_of(late.without("delay"), 0.02) == []
+
+
+def test_what_has_no_name_and_is_taken_off_by_the_clock_is_said_to_go_on(one: Session) -> None:
+    """0.00002 of full scale a second is 7.2 % in an hour, through the gain that follows it."""
+    drift = np.array([2e-5, 0.0, 0.0, 1.0])
+    drifting = MODEL.with_part("zero_drift", drift)
+    (said,) = going_on_of(drifting, [one], (), STANDARD)
+    assert "(zero drift by -7.2 %)" in said
+    assert going_on_of(drifting, [one], ("zero_drift",), STANDARD) == []  # a cause is told as one
+    assert going_on_of(MODEL.with_part("zero_drift", 0.2 * drift), [one], (), STANDARD) == []  # hardly anything
+    assert going_on_of(MODEL, [one], (), STANDARD) == []
+
+
+def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
+    late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
+    assert undone_of(late, one).names == ("dead_band",)
+    assert undone_of(MODEL, one) is MODEL
 
 
 def test_an_effect_that_is_far_larger_in_what_was_not_fitted_is_beyond_knowledge(one: Session) -> None:

@@ -307,6 +307,10 @@ def test_a_rail_below_which_the_sensor_does_not_go(protocol, seed, rail_mbar):
     on = (reading < rail_mbar) & (recording.load.values > 20.0)
     assert recall_and_false(found, on, reading <= rail_mbar)[0] >= RECALL
     assert not found.usable[0][reading <= rail_mbar].any()
+    (fault,) = found.faults
+    blind_n = float(fault.says.split("loads below about ")[1].split(" N are not seen")[0])
+    there = np.abs(reading - rail_mbar) < 0.5  # creep and noise move where a load reads so
+    assert 0.6 * blind_n < float(np.median(recording.force_n[there])) < 1.6 * blind_n
 
 
 def test_of_a_unit_whose_sensor_ends_above_its_zero_no_zero_is_told() -> None:

@@ -19,7 +19,15 @@ class LinearLeak(CoreEffect):
     name, family, stage = "linear_leak", "leak", "gas"
     says = "air leaves in proportion to the pressure: the reading falls in holds and lies below zero afterwards"
     parameters = (
-        EffectParameter("leak_rate", "1/s", "share of the gauge pressure lost a second", 0.0, 0.0, 5.0, 1e-3),
+        EffectParameter(
+            "leak_rate",
+            "1/s",
+            "share of the air's deformation lost a second; a held reading falls at 1 - 1/N of it, 0.375 where N is 1.6",
+            0.0,
+            0.0,
+            5.0,
+            1e-3,
+        ),
     )
     exposed_by = by("holds", "rests")
     separated_by = {
