@@ -71,9 +71,9 @@ class Excitation:
                 f"{seen}: nothing can be said of rate dependence, nor can viscous friction be told from Coulomb's"
             )
         if "holds" not in self.present:
+            of_leaks = "" if "peaks" in self.present else ", and the law of a leak is unsure"
             said.append(
-                f"no hold longer than {self.thresholds.hold_s:g} s under load: the law of a leak is unsure, and slow"
-                " creep is not seen"
+                f"no hold longer than {self.thresholds.hold_s:g} s under load: slow creep is not seen{of_leaks}"
             )
         if "rests" not in self.present:
             why = (

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._state import State, with_members
 from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of, fitted_rms
+from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -37,13 +39,15 @@ MOST_CHANGES = 6
 class OwnGain:
     """A gain of a ``recording`` from ``begins_s`` on; ``share`` by which it lies beside that of all.
 
-    ``is_change``: the recording had another before.
+    ``is_change``: the recording had another before. ``unseen_s``: for how long before ``begins_s`` there was no load
+    that would have shown it.
     """
 
     recording: str
     begins_s: float
     share: float
     is_change: bool = False
+    unseen_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,7 @@ class ZeroChange:
     recording: str
     begins_s: float
     share: float
+    unseen_s: ClassVar[float] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,13 +279,23 @@ def foretells(
     return LeftOut(sessions, state.evidence.noise_sd, model, state.thresholds, is_apart=True).stands(model, plain)
 
 
-def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain, ...]:
-    """The gains of the fitted recordings, in order."""
-    return tuple(
-        OwnGain(one.recording.name, _time_s(one, at), one.own_gain_sd * float(gain), at > 0)
-        for one, gains, _ in _own_of_each(sessions, model)
-        for at, gain in zip((0, *one.gain_changes), gains, strict=False)  # none where all share one
-    )
+def gains_of(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> tuple[OwnGain, ...]:
+    """The gains of the fitted recordings, in order; each begins where a load first shows it."""
+    found = []
+    for one, gains, _ in _own_of_each(sessions, model):
+        for at, gain in zip((0, *one.gain_changes), gains, strict=False):  # none where all share one
+            last, first = _loaded_about(one, at, thresholds) if at else (0, 0)
+            begins_s = _time_s(one, first)
+            unseen_s = begins_s - _time_s(one, last) if first > last + 1 else 0.0
+            found.append(OwnGain(one.recording.name, begins_s, one.own_gain_sd * float(gain), at > 0, unseen_s))
+    return tuple(found)
+
+
+def _loaded_about(session: Session, at: int, thresholds: Thresholds) -> tuple[int, int]:
+    """The last sample under load before ``at``, and the first one from there on; ``at`` itself where there is none."""
+    loaded = np.abs(session.conditions.load) > thresholds.standing
+    before, after = np.flatnonzero(loaded[:at]), np.flatnonzero(loaded[at:])
+    return int(before[-1]) if before.size else at, at + int(after[0]) if after.size else at
 
 
 def zero_changes_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[ZeroChange, ...]:
@@ -305,6 +320,14 @@ def _own_of_each(sessions: Sequence[Session], model: ExtendedModel) -> Iterator[
 def _time_s(session: Session, at: int) -> float:
     """The file's time at a sample of a session."""
     return float(session.recording.time_s[0] + session.conditions.time_s[at])
+
+
+def time_of(change: OwnGain | ZeroChange) -> str:
+    """When it changes: a moment, or the stretch without a load in which it may have been any."""
+    ends = moment(change.begins_s, 4)
+    if not change.unseen_s:
+        return f"at {ends} s"
+    return f"between {moment(change.begins_s - change.unseen_s, 4)} and {ends} s, without load"
 
 
 def changes_of(gains: Sequence[OwnGain]) -> tuple[OwnGain, ...]:

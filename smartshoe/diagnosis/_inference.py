@@ -123,7 +123,8 @@ def _beside_own(beside: Inference, plain: Fit, gained: Sequence[Session], is_for
     """What was found ``beside`` gains or zeros of the recordings' own, with these; no effect where none foretells."""
     if not (beside.own_gains or beside.zero_changes):
         about = gained, beside.fit.model
-        beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
+        gains = gains_of(*about, beside.fit.likelihood.thresholds)
+        beside = replace(beside, own_gains=gains, zero_changes=zero_changes_of(*about))
     if is_foretold:
         return replace(beside, baseline=plain)
     return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)

@@ -11,7 +11,7 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of
 from smartshoe.diagnosis._baseline import RATE, WALL_RATIOS, is_stretched
 from smartshoe.diagnosis._excitation import Excitation
-from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
+from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of, time_of
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
@@ -19,7 +19,6 @@ from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import OwnZeros, Zero
-from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect, in_words, listed
@@ -286,7 +285,7 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
 
 
 def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
-    few = [f"by {100 * one.share:+.2g} % at {moment(one.begins_s, 4)} s in {one.recording}" for one in changes[:SAID]]
+    few = [f"by {100 * one.share:+.2g} % {time_of(one)} in {one.recording}" for one in changes[:SAID]]
     return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 
 

@@ -10,14 +10,13 @@ import numpy as np
 from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import EXPERIMENTS
-from smartshoe.diagnosis._gains_and_zeros import changes_of
+from smartshoe.diagnosis._gains_and_zeros import changes_of, time_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
 from smartshoe.diagnosis._members import begun_with
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Session
-from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
@@ -168,8 +167,8 @@ def _again(found: Inference) -> str:
     for what, changes in (("gain", changes_of(found.own_gains)), ("zero", found.zero_changes)):
         if changes:
             return (
-                f"record {changes[0].recording} again, and watch unit, cable and logger at"
-                f" {moment(changes[0].begins_s, 4)} s: whether the {what} changes there each time"
+                f"record {changes[0].recording} again, and watch unit, cable and logger {time_of(changes[0])}: whether"
+                f" the {what} changes there each time"
             )
     return (
         "record one of these again twice, once without moving the unit and once after taking it out and putting it"

@@ -405,7 +405,10 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
     rich = Excitation((0.1, 0.5), (0.5, 1.0), 2, every, STANDARD)
     for changes, words in (
         ({"rates_per_s": (0.1,)}, "one loading rate only"),
-        ({"present": every - {"holds"}}, "no hold longer than 3 s under load"),
+        (
+            {"present": every - {"holds"}},
+            "no hold longer than 3 s under load: slow creep is not seen, and the law of a leak",
+        ),
         ({"present": every - {"rests"}}, "never seen at rest without load"),
         ({"present": every - {"rests"}, "is_unread_at_rest": True}, "no reading of the unit at rest without load can"),
         ({"present": every - {"repeats"}}, "no load cycle is repeated"),
@@ -413,6 +416,10 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
     ):
         (said,) = replace(rich, **changes).limits()  # type: ignore[arg-type]
         assert words in said
+    (said,) = replace(
+        rich, present=every - {"holds"} | {"peaks", "shuffled_loads"}
+    ).limits()  # peaks tell the laws of leaks apart
+    assert said.endswith("slow creep is not seen")
     assert len(replace(rich, rates_per_s=(0.1,), peaks=(1.0,)).limits()) == 2
     (said,) = replace(rich, is_judged=False).limits()
     assert "how good a simulation is on data it was not fitted to is not known" in said
