@@ -113,9 +113,10 @@ def test_parameters_of_an_equation_that_is_not_in_the_model_are_told_as_such() -
     own = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in lag.parameters}
     law = replace(LEAK_CAUSE, effect=lag, parameters=own, part="flexible_lag")
     assert not_in_the_model(law) == (
-        "these parameters are of the equation of sensor lag, which is not in the extended model: in its place that"
-        " holds lag of free form, which follows the data more closely"
+        "these parameters are of the equation of sensor lag, which is not in the extended model: the model has lag"
+        " of free form in its place, which has no equation and follows the data more closely"
     )
+    assert "the model has delay in its place, which follows" in not_in_the_model(replace(law, part="delay"))
     block = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in effect("flexible_lag").parameters}
     for other in (
         replace(law, part="sensor_lag"), replace(law, part=None), replace(law, parameters={}),

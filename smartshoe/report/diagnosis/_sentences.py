@@ -86,9 +86,10 @@ def not_in_the_model(cause: Cause) -> str:
     """What is said beside parameters of an equation in whose place the extended model holds another form; or empty."""
     if not cause.parameters or cause.part in (None, cause.name) or is_free_form(cause):
         return ""
+    without = ", which has no equation and" if effect(str(cause.part)).is_flexible else ", which"
     return (
-        f"these parameters are of the equation of {in_words(cause.name)}, which is not in the extended model: in its"
-        f" place that holds {in_words(str(cause.part))}, which follows the data more closely"
+        f"these parameters are of the equation of {in_words(cause.name)}, which is not in the extended model: the model"
+        f" has {in_words(str(cause.part))} in its place{without} follows the data more closely"
     )
 
 

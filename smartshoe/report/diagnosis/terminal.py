@@ -120,7 +120,7 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
         for text in (_parameters(cause), not_in_the_model(cause)):
             if text:
                 _line(console, f"  {text}")
-    if any(cause.rivals for cause in diagnosis.causes):
+    if any(rival.says in why_this_one(cause) for cause in diagnosis.causes for rival in cause.rivals):
         _line(console, LIKELIHOOD)
 
 
