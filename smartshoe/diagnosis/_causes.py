@@ -64,8 +64,8 @@ def _without_it(name: Name) -> Statement:
         "fall of -2 log evidence",
         nothing,
         0.0,
-        f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log evidence, though the"
-        " other effects may bend to make up for it",
+        f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} (-2 log likelihood, 10 is strong"
+        " evidence), though other effects may take its place in part",
     )
 
 
@@ -73,11 +73,10 @@ def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[S
     if not rivals:
         return []
     nearest = rivals[0]
-    measure = "-2 log likelihood, by its fit" if nearest.by == "fit" else "-2 log evidence"
-    way = "less likely" if nearest.margin > 0.0 else "likelier"
-    how = f"{way} by {abs(nearest.margin):,.0f} of {measure}" if abs(nearest.margin) >= 0.5 else "as likely"
+    exact = ", equations taken as exact" if nearest.by == "fit" else ""
+    measure = f" (-2 log likelihood{exact})" if abs(nearest.margin) >= 0.5 else ""
     beside = " beside what cannot be ruled out" if equivalents and nearest.effect not in equivalents else ""
-    says = f"{in_words(nearest.effect)}, the nearest other{beside}, is {how}"
+    says = f"{in_words(nearest.effect)}, the nearest other{beside}, {nearest.says}{measure}"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 

@@ -42,7 +42,8 @@ def diagnose(
     hold_out
         Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is.
     material
-        Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given.
+        Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given. A
+        share, not percent: ``material=0.0005`` is 0.05 % of full scale, ``--material 0.05`` on the command line.
     thresholds
         Every number that decides.
     progress

@@ -51,7 +51,7 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another effect that came near: ``margin`` is by how much less likely it is, in -2 log.
+    """Another effect that came near: ``margin`` is by how much less likely it is, in -2 log; likelier where below zero.
 
     ``by``: of a law of the same kind in its place, the likelihood of a ``fit``; of another kind, the ``evidence``, in
     which equations may be inexact. The two are not on one scale. Where no cause is named, what it ``alone`` takes off.
@@ -60,6 +60,22 @@ class Rival:
     effect: str
     margin: float
     by: Literal["fit", "evidence", "alone"] = "evidence"
+
+    @property
+    def may_be_likelier(self) -> bool:
+        """Whether it is as likely or likelier in the place of what is named, to the nearest whole number."""
+        return self.margin < 0.5
+
+    @property
+    def says(self) -> str:
+        """How likely it is in the place of what is named: "is less likely by 12"; of a fit, how much worse it fits."""
+        size, of_fit = abs(self.margin), self.by == "fit"
+        if size < 0.5:
+            return "fits as well" if of_fit else "is as likely"
+        by = f"{size:,.0f}" if size >= 10.0 else f"{size:.2g}"
+        if self.margin > 0.0:
+            return f"{'fits worse' if of_fit else 'is less likely'} by {by}"
+        return f"{'fits better' if of_fit else 'is likelier'} by {by}"
 
     def to_dict(self) -> dict[str, Any]:
         """The contract's entry in ``rivals``."""

@@ -12,11 +12,11 @@ from rich.table import Table
 
 from smartshoe.report.numbers import plain, with_sd
 
-USUAL, NARROWEST = 80, 40  # characters
+USUAL, NARROWEST = 120, 40  # characters
 
 
 def new_console() -> Console:
-    """A console as wide as the terminal, or as ``COLUMNS`` says in a pipe: 80 where it says nothing."""
+    """A console as wide as the terminal, or as ``COLUMNS`` says in a pipe: 120 where it says nothing."""
     # Without markup: names from files may look like it.
     console = Console(highlight=False, markup=False)
     if console.is_terminal:

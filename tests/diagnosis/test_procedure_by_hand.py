@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
 MODEL = ExtendedModel(1.2, 0.08, 0.22, 800.0, 140.0, "mbar")
+BY_FIT = "(-2 log likelihood, equations taken as exact)"
 SCALE = Scale(800.0, -140.0, MILLIBAR, 3.0)
 BEFORE = Errors(np.array([4.0, 12.0]), np.array([100.0, 300.0]), 0.8)
 AFTER = Errors(np.array([1.0, 3.0]), np.array([100.0, 300.0]), 0.8)
@@ -320,16 +321,16 @@ def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monke
     fall, size, gained, rival = cause.evidence
     assert (fall.value, fall.threshold) == (55.0, 0.0)
     assert fall.says == (
-        "without it, all else fitted anew, the data is less likely by 55 of -2 log evidence, though the other effects"
-        " may bend to make up for it"
+        "without it, all else fitted anew, the data is less likely by 55 (-2 log likelihood, 10 is strong evidence),"
+        " though other effects may take its place in part"
     )
     assert (size.value, gained.value) == (pytest.approx(1.23), pytest.approx(50.0))
     assert (rival.value, rival.threshold) == (7.0, 0.0)
-    assert rival.says == "orifice leak, the nearest other, is less likely by 7 of -2 log likelihood, by its fit"
+    assert rival.says == f"orifice leak, the nearest other, fits worse by 7 {BY_FIT}"
     cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 95.0),))  # of another kind there is the evidence alone
     assert cause.rivals == (Rival("delay", 90.0, "evidence"), Rival("orifice_leak", 95.0, "fit"))
     beside = "beside what cannot be ruled out"  # an orifice, by its fit
-    assert cause.evidence[-1].says == f"delay, the nearest other {beside}, is less likely by 90 of -2 log evidence"
+    assert cause.evidence[-1].says == f"delay, the nearest other {beside}, is less likely by 90 (-2 log likelihood)"
 
 
 def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -398,16 +399,16 @@ def test_no_rival_is_a_block_of_free_form(monkeypatch: pytest.MonkeyPatch) -> No
     cause = _told(monkeypatch, exposed, laws=(("flexible_leak", 1.0),), alternatives=near)
     assert cause.rivals == (Rival("dead_band", 70.0, "evidence"), Rival("delay", 90.0, "evidence"))
     beside = "beside what cannot be ruled out"  # an orifice, by its fit
-    assert cause.evidence[-1].says == f"dead band, the nearest other {beside}, is less likely by 70 of -2 log evidence"
+    assert cause.evidence[-1].says == f"dead band, the nearest other {beside}, is less likely by 70 (-2 log likelihood)"
 
 
 @pytest.mark.parametrize(
     ("margin", "said"),
     [
-        (0.6, "less likely by 1 of -2 log likelihood, by its fit"),
-        (0.0, "as likely"),
-        (-0.4, "as likely"),
-        (-3.0, "likelier by 3 of -2 log likelihood, by its fit"),
+        (0.6, f"fits worse by 0.6 {BY_FIT}"),
+        (0.0, "fits as well"),
+        (-0.4, "fits as well"),
+        (-3.0, f"fits better by 3 {BY_FIT}"),
     ],
 )
 def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelier(
@@ -415,10 +416,12 @@ def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelie
 ) -> None:
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", margin),))
     (rival,) = (one for one in cause.evidence if one.statistic == "margin to the nearest rival")
-    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, is {said}")
+    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, {said}")
     assert _against(()) == []
     (far,) = _against([Rival("delay", 278533.0, "evidence")])
-    assert far.says == "delay, the nearest other, is less likely by 278,533 of -2 log evidence"
+    assert far.says == "delay, the nearest other, is less likely by 278,533 (-2 log likelihood)"
+    (likelier,) = _against([Rival("delay", -12.0, "evidence")])
+    assert likelier.says == "delay, the nearest other, is likelier by 12 (-2 log likelihood)"
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])

@@ -14,7 +14,7 @@ from browser import Browser
 from diagnoses_made import BASELINE, CASES, FULL_READING, LEAK, LEAK_CAUSE, NAME, RUN_NEXT, case, page, plain_text
 from looks import look, unfold
 
-from smartshoe.diagnosis import Thresholds, Trace
+from smartshoe.diagnosis import Rival, Thresholds, Trace
 from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Statement
 from smartshoe.models.effects import effect
 from smartshoe.models.parameter import Parameter
@@ -59,16 +59,86 @@ def test_the_size_comes_before_the_judgement(name: str) -> None:
     assert 'data-chart="0"' not in page("refused")
 
 
-def test_likelihood_thresholds_and_limits_are_folded_and_the_thresholds_whole() -> None:
+def _is_folded(html: str, said: str) -> bool:
+    before = html[: html.index(said)]
+    return before.count("<details") > before.count("</details>")
+
+
+def test_likelihood_and_thresholds_are_folded_and_the_thresholds_whole() -> None:
     html = page("two causes")
-    for said in (
-        "is told in −2 log likelihood",
-        "load cells: 0.02 % of rating",
-        "A wrong calibration of the sensor itself",
-    ):
-        before = html[: html.index(said)]
-        assert before.count("<details") > before.count("</details>"), said
+    assert html.count("are differences of −2 log likelihood") == 1
+    for said in ("are differences of −2 log likelihood", "load cells: 0.02 % of rating"):
+        assert _is_folded(html, said), said
     assert html.count("<summary>Every number that decides") == 1
+
+
+def test_limits_are_not_folded_and_recordings_that_were_left_out_are(tmp_path: Path) -> None:
+    made = replace(
+        case("one cause"), limits=("left out: r1.csv: it stands", "one rate only"), left_out=("r1.csv: it stands",)
+    )
+    html = write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8")
+    assert "What this data cannot say (1)" in html
+    assert not _is_folded(html, "One rate only.")
+    assert not _is_folded(html, "A wrong calibration of the sensor itself")
+    assert _is_folded(html, "r1.csv: it stands.")
+    assert "Recordings that were left out" not in page("one cause")
+
+
+@pytest.mark.parametrize(
+    ("name", "nothing", "no_more"),
+    [
+        (
+            "adequate",
+            "Nothing: the calibration of the baseline can be used as it is.",
+            "No further experiment is needed:",
+        ),
+        ("one cause", "Nothing more is needed to tell the causes apart:", "No further experiment is needed to tell"),
+        ("unexplained", "No experiment stands out.", "No experiment stands out."),
+        ("two causes", RUN_NEXT[1:], RUN_NEXT[1:]),
+    ],
+)
+def test_what_to_do_next_says_where_the_calibration_s_force_may_be_off(
+    name: str, nothing: str, no_more: str, tmp_path: Path
+) -> None:
+    """A calibration is not said to need nothing more where a limit says by how many newtons it is off."""
+    off = "a calibration takes one zero for all recordings: so the force of u02h is off by 8.4 N (rms)"
+    of_data = "one loading rate only: nothing can be said of rate dependence"
+
+    def told(*limits: str) -> str:
+        made = replace(case(name), limits=limits)
+        text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
+        return text[text.index("What to do next") : text.index("Where the error sits")]
+
+    assert nothing in told(of_data)
+    assert "force may be off" not in told(of_data)
+    said = told(of_data, off)
+    assert no_more in said
+    assert nothing == no_more or nothing not in said
+    assert f"Before you use the calibration, know where its force may be off: {off[0].upper()}{off[1:]}." in said
+    assert of_data[1:] not in said
+
+
+def test_a_likelier_effect_is_not_told_as_ruled_out_and_an_equation_that_is_not_in_the_model_is_said_to_be(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lag = effect("sensor_lag")
+    own = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in lag.parameters}
+    near = (Rival("clock_drift", -155.0), Rival("dead_band", 45.0))
+    cause = replace(LEAK_CAUSE, effect=lag, parameters=own, part="flexible_lag", rivals=near)
+    made = replace(case("one cause"), causes=(cause,))
+    html = write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8")
+    text = plain_text(html)
+    likelier, out = text.index("alone in its place as likely or likelier"), text.index("came near, and is ruled out")
+    assert likelier < text.index("clock drift is likelier by 155") < out < text.index("dead band is less likely by 45")
+    beside = "hese parameters are of the equation of sensor lag, which is not in the extended model"
+    assert not _is_folded(html, beside)
+    assert "ruled out less" not in plain_text(page("one cause"))
+    assert "alone in its place" not in plain_text(page("one cause"))
+    assert beside not in plain_text(page("one cause"))
+    print_diagnosis(made)
+    said = capsys.readouterr().out
+    assert f"  t{beside}" in said
+    assert "clock drift alone in its place is likelier by 155" in said
 
 
 def test_figures_for_papers_are_written_when_asked_for(tmp_path: Path) -> None:
@@ -119,7 +189,9 @@ def test_pointing_at_the_error_reads_it_and_dragging_zooms(browser: Browser, pag
 def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be() -> None:
     text = plain_text(page("two causes"))
     assert "1. Linear leak: over 99 % sure" in text
-    assert "2. Play hysteresis: 95 % sure that it is this or bouc wen hysteresis, 62 % for this one" in text
+    assert (
+        "2. Play hysteresis: 95 % sure that it is this or bouc wen hysteresis; if so, 62 % that it is this one" in text
+    )
     assert LEAK[0].says[1:] in text
     assert "0.002000 [0.001941, 0.002059] 1/s" in text
     assert "9.60 [8.82, 10.38] N" in text
@@ -131,15 +203,14 @@ def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be()
     )
     assert effect("bouc_wen_hysteresis").says in text
     assert (
-        "No other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88 (−2 log, by"
-        " evidence). Family:" in text
+        "No other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88. Family:" in text
     )
     assert "In the extended model without being causes, too small or too unsure for a name: sensor lag." in text
     for heading in ("cannot be ruled out", "came near, and is ruled out"):
-        assert f"{heading} less likely by, −2 log what it would be what tells the two apart" in text
-    assert "bouc wen hysteresis 1.7 (fit) " in text
-    assert "dead band 45 (evidence) " in text
-    assert "zero drift 88 (evidence) " in text
+        assert f"{heading} in the place of this one what it would be what tells the two apart" in text
+    assert "bouc wen hysteresis fits worse by 1.7 " in text
+    assert "dead band is less likely by 45 " in text
+    assert "zero drift is less likely by 88 " in text
     assert "of full scale: error of the extended model" in text
     assert "free form" not in text
 
@@ -241,8 +312,10 @@ def test_faults_left_over_and_the_next_experiment_are_told() -> None:
     assert "Held samples, triangles_1, 5.0–5.6 s (2.0 % of the samples): a value repeats while the load moves." in text
     assert "Spikes, triangles_2, 40.00 s (under 0.01 % of the samples): one sample stands alone. (Minor.)" in text
     assert f"What to do next {RUN_NEXT[0].upper()}{RUN_NEXT[1:]}. The protocol is in x.toml : paste it into" in text
-    left = "70 % of the power that is left lies at 50-75 % of full load while unloading."
-    assert left in plain_text(page("partly_explained"))
+    left = "70 % of the power that is left lies at 50-75 % of full load while unloading"
+    assert f"What is left: {left}." in plain_text(page("partly_explained"))
+    of_baseline = f"What the baseline leaves: {left}; the extended model leaves nothing beyond noise."
+    assert of_baseline in plain_text(page("unexplained"))
     assert "no reference load: name it with --force" in plain_text(page("refused"))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -12,10 +14,23 @@ from diagnoses_made import BASELINE, LEAK, LEAK_CAUSE, PLAY_CAUSE, case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smartshoe.diagnosis import Gain
-from smartshoe.diagnosis._result import Rival
+from smartshoe.diagnosis import Gain, Rival, Thresholds, _force
+from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._force import Compensation, ForceError, as_calibrated, force_of, not_undone_of
+from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
+from smartshoe.diagnosis._limits import (
+    elsewhere_of,
+    led_back_of,
+    own_gains_of,
+    own_zeros_of,
+    past_of,
+    refusals_of,
+    worse_of,
+    zero_changes_said,
+)
+from smartshoe.diagnosis._zero import OwnZeros, Zero
 from smartshoe.display import sure
-from smartshoe.models.effects import effect, listed
+from smartshoe.models.effects import effect, listed, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
@@ -25,13 +40,18 @@ from smartshoe.report.diagnosis._sentences import (
     gain_text,
     heading,
     interval,
+    likelier,
+    limits_of_the_force,
+    not_in_the_model,
     nothing_left,
     parameter_text,
     percent_of_whole,
+    ruled_out,
     shares,
     shares_text,
     two_numbers,
     unnamed,
+    what_is_left,
     what_was_gained,
     why_this_one,
 )
@@ -40,14 +60,133 @@ percent = st.floats(-50.0, 150.0)
 
 
 def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weighed_by() -> None:
-    text = "no other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88 (−2 log, by"
-    assert why_this_one(LEAK_CAUSE) == f"{text} evidence)"
-    assert why_this_one(replace(LEAK_CAUSE, rivals=(Rival("zero_drift", 88.0, "fit"),))) == f"{text} its fit)"
+    text = "no other effect of the catalogue does as well; the nearest, zero drift,"
+    assert why_this_one(LEAK_CAUSE) == f"{text} is less likely by 88"
+    assert why_this_one(replace(LEAK_CAUSE, rivals=(Rival("zero_drift", 88.0, "fit"),))) == f"{text} fits worse by 88"
     assert why_this_one(replace(LEAK_CAUSE, rivals=())) == "no other effect of the catalogue comes near"
     several = replace(PLAY_CAUSE, equivalents=("bouc_wen_hysteresis", "dead_band"))
     assert why_this_one(several) == (
         "bouc wen hysteresis and dead band cannot be ruled out, since no equation is exact: take the name as one of 3"
     )
+
+
+def test_a_rival_that_is_likelier_is_told_as_such_and_not_as_ruled_out() -> None:
+    """Also beside effects that cannot be ruled out; a difference below one half is none."""
+    near = (Rival("clock_drift", -155.0), Rival("zero_drift", 0.4), Rival("delay", 0.6), Rival("dead_band", 45.0))
+    cause = replace(LEAK_CAUSE, rivals=near)
+    assert [(one.name, one.margin) for one in likelier(cause)] == [
+        ("clock drift", "is likelier by 155"), ("zero drift", "is as likely"),
+    ]  # fmt: skip
+    assert [(one.name, one.margin) for one in ruled_out(cause)] == [
+        ("delay", "is less likely by 0.6"), ("dead band", "is less likely by 45"),
+    ]  # fmt: skip
+    alone = "clock drift alone in its place is likelier by 155"
+    assert why_this_one(cause) == alone
+    assert why_this_one(replace(cause, equivalents=("zero_drift",))) == (
+        f"zero drift cannot be ruled out, since no equation is exact: take the name as one of 2; {alone}"
+    )
+    untold = replace(cause, equivalents=("clock_drift", "zero_drift"))
+    assert likelier(untold) == []
+    assert "alone" not in why_this_one(untold)
+
+
+@pytest.mark.parametrize(
+    ("margin", "by", "said"),
+    [
+        (88.0, "evidence", "is less likely by 88"),
+        (278533.0, "evidence", "is less likely by 278,533"),
+        (9.96, "fit", "fits worse by 10"),
+        (1.7, "fit", "fits worse by 1.7"),
+        (0.4, "fit", "fits as well"),
+        (-0.4, "evidence", "is as likely"),
+        (-3.0, "fit", "fits better by 3"),
+        (-432.0, "evidence", "is likelier by 432"),
+    ],
+)
+def test_a_rival_is_told_by_what_its_margin_is(margin: float, by: Literal["fit", "evidence"], said: str) -> None:
+    assert Rival("delay", margin, by).says == said
+    assert Rival("delay", margin, by).may_be_likelier is (margin < 0.5)
+
+
+def test_parameters_of_an_equation_that_is_not_in_the_model_are_told_as_such() -> None:
+    lag = effect("sensor_lag")
+    own = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in lag.parameters}
+    law = replace(LEAK_CAUSE, effect=lag, parameters=own, part="flexible_lag")
+    assert not_in_the_model(law) == (
+        "these parameters are of the equation of sensor lag, which is not in the extended model: the model has lag"
+        " of free form in its place, which has no equation and follows the data more closely"
+    )
+    assert "the model has delay in its place, which follows" in not_in_the_model(replace(law, part="delay"))
+    block = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in effect("flexible_lag").parameters}
+    for other in (
+        replace(law, part="sensor_lag"), replace(law, part=None), replace(law, parameters={}),
+        replace(law, parameters=block),
+    ):  # fmt: skip
+        assert not_in_the_model(other) == ""
+
+
+def test_each_limit_of_the_calibration_s_force_is_told_by_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the sentences of those that make them: what is reworded there must be known here."""
+    lag = BASELINE.with_part("delay", np.array([0.1]))
+    errors_n = ForceError(5.0, 6.0)
+    plain_one = Compensation(BASELINE, errors_n, errors_n, errors_n, is_plain=True)
+    zero = Zero(shift_of("reading"), 0.05, 0.01, 0.05)
+    scale: Any = SimpleNamespace(reading=70.0, unit=SimpleNamespace(symbol="mbar"), zero=0.0)
+    thresholds = Thresholds()
+    rest: Any = SimpleNamespace(
+        is_judged=True, rates_per_s=(1.0, 2.0), present={"holds", "repeats"}, goes_with_the_clock=False, peaks=(1, 2)
+    )
+    refused: Any = SimpleNamespace(can_validate=True, undone=("delay",), refused=("sensor_lag",))
+    monkeypatch.setattr(_force, "_off_by_n", lambda *_: np.full(4, 8.4))
+    monkeypatch.setattr(_force, "_off_n", lambda *_: np.full(4, 1.7))
+    monkeypatch.setattr(_force, "_compensator", lambda *_: None)
+    there: Any = SimpleNamespace(usable=np.ones(4, dtype=bool), recording=SimpleNamespace(name="u02h"))
+    of_force = [
+        *not_undone_of(lag, 0.01),
+        *force_of(plain_one),
+        *force_of(replace(plain_one, rejected=errors_n)),
+        *force_of(replace(plain_one, is_plain=False, passed_over=("sensor_lag",))),
+        *as_calibrated([there], BASELINE, 0.0, thresholds),
+        worse_of(Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0)), None),
+        elsewhere_of(0.19, 0.015, None),
+        past_of(zero, scale),
+        led_back_of(zero, scale, thresholds),
+        led_back_of(replace(zero, led_from=0.4), scale, thresholds),
+        *own_gains_of([OwnGain("a", 0.0, -0.01), OwnGain("b", 0.0, 0.02)]),
+        *own_zeros_of(OwnZeros(("a", "b"), np.array([0.0, 0.03])), scale),
+        *zero_changes_said([ZeroChange("a", 30.0, 0.02)]),
+        *Excitation.limits(rest),
+    ]
+    assert len(of_force) == 14
+    others = ("one loading rate only: nothing can be said of rate dependence", *refusals_of(refused))
+    made = replace(case("one cause"), limits=(*of_force, *others))
+    assert limits_of_the_force(made) == of_force
+
+
+def test_what_is_left_is_told_of_the_model_that_leaves_it() -> None:
+    """Without a cause, but with effects that have no name, it is what the baseline leaves."""
+    made = case("unexplained")
+    assert made.baseline is not None
+    assert made.extended is not None
+    less = what_is_left(made)
+    assert less == f"what the baseline leaves: {made.leftover}; the extended model leaves nothing beyond noise"
+    some = replace(made, extended=replace(made.extended, structure_rms=0.2))
+    assert what_is_left(some).endswith("; the extended model leaves less")
+    untested = replace(made, extended=replace(made.extended, structure_rms=math.nan))
+    assert what_is_left(untested).endswith("; the extended model leaves less")
+    own = f"what is left: {made.leftover}"
+    as_before = replace(made, extended=replace(made.extended, structure_rms=made.baseline.structure_rms))
+    for other in (as_before, replace(made, causes=(LEAK_CAUSE,)), replace(made, rejected=BASELINE)):
+        assert what_is_left(other) == own
+    assert what_is_left(replace(made, leftover=None)) == ""
+
+
+def test_what_effects_without_a_name_follow_is_not_called_explained() -> None:
+    made = replace(case("unexplained"), minor=("second_relaxation",), explained_percent=90.5)
+    assert shares_text(made) == (
+        "8 % of the error's variance is noise; of the rest 98 % is followed by effects that have no name."
+    )
+    assert shares_text(replace(made, causes=(LEAK_CAUSE,))).endswith("98 % is explained.")
 
 
 def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> None:
@@ -56,7 +195,7 @@ def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> Non
     doubted = replace(made, causes=(*made.causes, replace(made.causes[0], confidence=0.74)))
     assert heading(doubted).endswith("it is known what follows it, though not each cause is sure")
     of_zeros = replace(made, extended=made.baseline)
-    assert heading(of_zeros) == "The simulation is good enough, and what recordings have of their own is found"
+    assert heading(of_zeros) == "The simulation is good enough once the zero of the recordings is allowed for"
     assert heading(replace(of_zeros, verdict="partly_explained")).startswith("The simulation is wrong")
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from diagnoses_made import CASES, PLAY_CAUSE, RUN_NEXT, case
+from diagnoses_made import CASES, LEAK_CAUSE, PLAY_CAUSE, RUN_NEXT, case
 
 from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
@@ -55,8 +55,35 @@ def test_limits_come_before_recordings_that_were_left_out_and_none_is_cut_off(
     assert said.index(limits[-1]) < said.index("\n- r0.csv: the load stands still") < said.index("and 78 more")
 
 
-def test_the_terminal_tells_of_a_name_how_far_it_is_this_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_terminal_tells_of_a_name_how_far_it_is_this_one(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "240")
     print_diagnosis(replace(case("one cause"), causes=(PLAY_CAUSE,)))
     said = " ".join(capsys.readouterr().out.split())
-    assert "95 %" in said
-    assert "62 %" in said
+    assert "95 % one of these; if so, 62 % this one" in said
+
+
+def test_the_terminal_tells_what_parameters_are_and_what_likelihood_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once below all causes, where a rival is told; where the width is not known no number is folded."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    print_diagnosis(case("two causes"))
+    said = capsys.readouterr().out
+    assert "  parameters: leak rate (share of the gauge pressure lost a second)\n" in said
+    assert "half height (half of the major loop's greatest height), width (half width of the play" in said
+    assert said.count("are differences of −2 log likelihood") == 1
+    assert "0.002000 [0.001941, 0.002059] 1/s" in said
+    # Of effects that cannot be ruled out no difference is told.
+    print_diagnosis(replace(case("one cause"), causes=(replace(LEAK_CAUSE, rivals=()), PLAY_CAUSE)))
+    assert "likelihood" not in capsys.readouterr().out
+
+
+def test_where_the_force_may_be_off_stands_apart_from_other_limits(capsys: pytest.CaptureFixture[str]) -> None:
+    off = "no compensator takes off the delay"
+    print_diagnosis(replace(case("one cause"), limits=("one rate only", off)))
+    said = capsys.readouterr().out
+    assert f"where the calibration's force may be off\n- {off}\n" in said
+    assert "limits of this data\n- one rate only\n" in said
+    assert said.count(off) == 1

@@ -30,7 +30,7 @@ def test_a_run_s_tables_fit_the_width_and_cut_nothing(
     )
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "1 of 2 units good."
-    assert max(len(line.rstrip()) for line in said) <= int(columns or 80)
+    assert max(len(line.rstrip()) for line in said) <= int(columns or 120)
     assert "…" not in "".join(said)
     assert sum("1.34099±0.00061" in line for line in said) == 2
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from smartshoe.diagnosis import Cause, Diagnosis, described
-from smartshoe.models.effects import effect, in_words
+from smartshoe.models.effects import in_words
 from smartshoe.report.charts import Chart
 from smartshoe.report.diagnosis import _charts as charts
 from smartshoe.report.diagnosis import _sentences as sentences
@@ -31,8 +31,10 @@ class Card:
     gain: str
     parameters: Sequence[tuple[str, str, str]]
     is_free_form: bool
+    not_in_the_model: str
     why: str
     equivalents: Sequence[sentences.Neighbour]
+    likelier: Sequence[sentences.Neighbour]
     rivals: Sequence[sentences.Neighbour]
 
 
@@ -55,6 +57,8 @@ def write_diagnosis_page(
         "said": said,
         "numbers": _numbers(diagnosis),
         "gained": sentences.what_was_gained(diagnosis),
+        "of_the_force": sentences.limits_of_the_force(diagnosis),
+        "left_over": sentence(sentences.what_is_left(diagnosis)),
         "nothing_left": sentences.nothing_left(diagnosis),
         "why_no_name": sentences.why_no_name(diagnosis),
         "comparison": sentences.comparison(diagnosis),
@@ -62,6 +66,7 @@ def write_diagnosis_page(
         "parts": _parts(diagnosis),
         "turned_over": sentences.turned_over(diagnosis),
         "intervals": sentences.INTERVALS,
+        "likelihood": sentences.LIKELIHOOD,
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
         "minor": sentences.unnamed(diagnosis),
         "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
@@ -110,7 +115,7 @@ def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     if part is None:
         return []
     return [
-        ("explained", "corrected", part.explained),
+        (sentences.followed(diagnosis), "corrected", part.explained),
         ("could be explained, and is left", "raw", part.left),
         ("noise", "soft", part.noise),
     ]
@@ -151,19 +156,20 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 
 
 def _card(number: int, cause: Cause) -> Card:
-    valued = cause.effect if cause.part is None else effect(cause.part)  # of a free form, its own parameters
-    says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
+    says = sentences.meanings(cause)
     return Card(
         f"{number}. {in_words(cause.name).capitalize()}",
         cause,
         sentences.how_sure(cause),
         sentences.gain_sentence(cause.held_out),
         [
-            (words(name), sentences.parameter_text(parameter), says.get(name, ""))
+            (words(name), sentences.parameter_text(parameter), says[name])
             for name, parameter in cause.parameters.items()
         ],
         sentences.is_free_form(cause),
+        sentence(sentences.not_in_the_model(cause)),
         sentence(sentences.why_this_one(cause)),
         sentences.neighbours(cause, cause.equivalents),
-        sentences.other_rivals(cause),
+        sentences.likelier(cause),
+        sentences.ruled_out(cause),
     )

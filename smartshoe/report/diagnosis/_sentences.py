@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
+from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit, Rival
 from smartshoe.display import sure
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects import catalogue, in_words, listed, told_apart_by
+from smartshoe.models.effects import catalogue, effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain, with_unit
@@ -25,11 +25,21 @@ HEADINGS = {
     "refused": "No diagnosis: this data does not allow one",
 }
 NOT_SURE = "The simulation is wrong, and it is known what follows it, though not each cause is sure"
-OF_THEIR_OWN = "The simulation is good enough, and what recordings have of their own is found"
+OF_THEIR_OWN = "The simulation is good enough once the zero of the recordings is allowed for"
 INTERVALS = (
     "A parameter's interval is of the noise alone: where its equation is not exact the value may be off by more."
 )
+LIKELIHOOD = (
+    "“Less likely by” and “fits worse by” are differences of −2 log likelihood. “Less likely by 10” is strong evidence."
+    " “Fits worse by” takes equations as exact, which they are not, so that it must be much more than 10."
+)
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
+# Words of a limit that says where the calibration's force may be off: what it does not undo, zeros, gains, its range.
+OF_THE_FORCE = (
+    "calibrat", "compensat", "no model foresees", "a zero of its own", "zero, tare", "the zero stands",
+    "led back to no load", "without load the reading stands", "end of its range", "held-out recordings are off",
+    "the gain within a file", "is extrapolated",
+)  # fmt: skip
 
 
 def heading(diagnosis: Diagnosis) -> str:
@@ -54,14 +64,12 @@ def is_of_recordings(diagnosis: Diagnosis) -> bool:
 
 def how_sure(cause: Cause) -> str:
     """The confidence of a cause, and where others may be meant how far it is this one."""
-    said = f"{sure(cause.confidence)} sure"
-    meant = listed(("this", *cause.equivalents), "or")
-    return f"{said} that it is {meant}, {for_this_one(cause)}" if cause.equivalents else said
-
-
-def for_this_one(cause: Cause) -> str:
-    """How far, of a cause and what this data cannot tell from it, it is the one that is named."""
-    return f"{sure(cause.law_confidence)} for this one"
+    if not cause.equivalents:
+        return f"{sure(cause.confidence)} sure"
+    return (
+        f"{sure(cause.confidence)} sure that it is this or {listed(cause.equivalents, 'or')}; if so,"
+        f" {sure(cause.law_confidence)} that it is this one"
+    )
 
 
 def unnamed(diagnosis: Diagnosis) -> str:
@@ -72,6 +80,29 @@ def unnamed(diagnosis: Diagnosis) -> str:
 def is_free_form(cause: Cause) -> bool:
     """Whether the numbers of a cause are those of a free form, since no equation of its kind fits well enough."""
     return cause.part is not None and not {one.name for one in cause.effect.parameters}.issuperset(cause.parameters)
+
+
+def not_in_the_model(cause: Cause) -> str:
+    """What is said beside parameters of an equation in whose place the extended model holds another form; or empty."""
+    if not cause.parameters or cause.part in (None, cause.name) or is_free_form(cause):
+        return ""
+    without = ", which has no equation and" if effect(str(cause.part)).is_flexible else ", which"
+    return (
+        f"these parameters are of the equation of {in_words(cause.name)}, which is not in the extended model: the model"
+        f" has {in_words(str(cause.part))} in its place{without} follows the data more closely"
+    )
+
+
+def meanings(cause: Cause) -> dict[str, str]:
+    """What each parameter of a cause is, by name; of a free form, its own; empty where the catalogue does not say."""
+    valued = cause.effect if cause.part is None else effect(cause.part)
+    says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
+    return {name: says.get(name, "") for name in cause.parameters}
+
+
+def limits_of_the_force(diagnosis: Diagnosis) -> list[str]:
+    """The limits that say where the calibration's force may be off: whoever uses it must know them."""
+    return [one for one in diagnosis.limits_of_the_rest if any(words in one for words in OF_THE_FORCE)]
 
 
 def unit_of(symbol: str) -> str:
@@ -246,9 +277,7 @@ def what_was_gained(diagnosis: Diagnosis) -> str:
     did = "Added" if diagnosis.rejected is None else "Tried and rejected"
     added = f"{did}: {'; '.join([', '.join(names), *without] if names else without)}."
     if is_of_recordings(diagnosis):
-        return (
-            f"{added} The plain model allows for what recordings have of their own, so that the error stays as it is."
-        )
+        return f"{added} The plain model allows for the zero of the recordings, so that the error stays as it is."
     won = diagnosis.gain
     if won is None or not math.isfinite(won.gain_percent):
         return added
@@ -286,7 +315,7 @@ def turned_over(diagnosis: Diagnosis) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Neighbour:
-    """Another effect that a cause might be: what it is, how much worse it fits, what would tell the two apart."""
+    """Another effect that a cause might be: what it is, how likely beside the cause, what would tell the two apart."""
 
     name: str
     says: str
@@ -306,34 +335,41 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
             Neighbour(
                 in_words(name),
                 other.says if other else "",
-                f"{plain(rivals[name].margin, 2)} ({rivals[name].by})" if name in rivals else "–",
+                rivals[name].says if name in rivals else "–",
                 "; ".join(apart),
             )
         )
     return found
 
 
-def other_rivals(cause: Cause) -> list[Neighbour]:
+def ruled_out(cause: Cause) -> list[Neighbour]:
     """The effects that came near and can be ruled out."""
-    return neighbours(cause, [rival.effect for rival in cause.rivals if rival.effect not in cause.equivalents])
+    return neighbours(cause, [rival.effect for rival in _others(cause) if not rival.may_be_likelier])
+
+
+def likelier(cause: Cause) -> list[Neighbour]:
+    """The effects that alone in the place of a cause would be as likely or likelier, though nothing else says so."""
+    return neighbours(cause, [rival.effect for rival in _others(cause) if rival.may_be_likelier])
+
+
+def _others(cause: Cause) -> list[Rival]:
+    return [rival for rival in cause.rivals if rival.effect not in cause.equivalents]
 
 
 def why_this_one(cause: Cause) -> str:
     """One sentence on how far the name can be trusted against its neighbours."""
+    others = _others(cause)
+    alone = [f"{in_words(one.effect)} alone in its place {one.says}" for one in others[:1] if one.may_be_likelier]
     if cause.equivalents:
-        return (
-            f"{listed(cause.equivalents, 'and')} cannot be ruled out, since no equation is exact: take the name as one"
-            f" of {len(cause.equivalents) + 1}"
-        )
-    if cause.rivals:
-        nearest = cause.rivals[0]
-        by = f"(−2 log, by {'its ' if nearest.by == 'fit' else ''}{nearest.by})"
-        if nearest.margin <= 0.0:
-            return f"{in_words(nearest.effect)} alone in its place is likelier by {plain(-nearest.margin, 2)} {by}"
-        return (
-            f"no other effect of the catalogue does as well; the nearest, {in_words(nearest.effect)}, is less likely by"
-            f" {plain(nearest.margin, 2)} {by}"
-        )
+        names = listed(cause.equivalents, "and")
+        among = f"{names} cannot be ruled out, since no equation is exact: take the name as one"
+        return "; ".join([f"{among} of {len(cause.equivalents) + 1}", *alone])
+    if alone:
+        return alone[0]
+    if others:
+        nearest = others[0]
+        near = in_words(nearest.effect)
+        return f"no other effect of the catalogue does as well; the nearest, {near}, {nearest.says}"
     return "no other effect of the catalogue comes near"
 
 
@@ -358,6 +394,15 @@ def shares(diagnosis: Diagnosis) -> Shares | None:
     return Shares(explained, explainable - explained, 100.0 - explainable)
 
 
+def followed(diagnosis: Diagnosis) -> str:
+    """What is said of the part of the error that the extended model does away with: explained, if anything has a name.
+
+    Where only effects without a name follow it, nothing is explained.
+    """
+    is_named = diagnosis.causes or not diagnosis.minor
+    return "explained" if is_named else "followed by effects that have no name"
+
+
 def percent_of_whole(percent: float) -> str:
     """A share that is not said to be all before it is."""
     return "over 99 %" if 99.0 < percent < 100.0 else f"{percent:.0f} %"
@@ -368,14 +413,31 @@ def shares_text(diagnosis: Diagnosis) -> str:
     part = shares(diagnosis)
     if part is None:
         said = percent_of_whole(diagnosis.explained_percent) if diagnosis.explained_percent >= 0.5 else "none"
-        return f"Of the error's variance {said} is explained; how much of the rest is noise cannot be told."
+        return f"Of the error's variance {said} is {followed(diagnosis)}; how much of the rest is noise cannot be told."
     explainable = part.explained + part.left
     if explainable < 0.5:
         return "Nearly all of the error's variance is noise, which no model explains."
     noise = "under 1 %" if part.noise < 1.0 else f"{part.noise:.0f} %"
     explained = 100.0 * part.explained / explainable
     of_it = percent_of_whole(explained) if explained >= 0.5 else "none"
-    return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it} is explained."
+    return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it} is {followed(diagnosis)}."
+
+
+def what_is_left(diagnosis: Diagnosis) -> str:
+    """Where what is left sits, and which model leaves it; empty where nothing is said.
+
+    Where no cause is named and effects without a name leave less than the baseline, it is the baseline's.
+    """
+    before, after = diagnosis.baseline, diagnosis.extended
+    if not diagnosis.leftover:
+        return ""
+    if diagnosis.causes or diagnosis.rejected is not None or before is None or after is None:
+        return f"what is left: {diagnosis.leftover}"
+    plain_rms, rms = (one.structure_rms if math.isfinite(one.structure_rms) else 0.0 for one in (before, after))
+    if plain_rms <= rms:
+        return f"what is left: {diagnosis.leftover}"
+    rest = "nothing beyond noise" if after.structure_rms == 0.0 else "less"
+    return f"what the baseline leaves: {diagnosis.leftover}; the extended model leaves {rest}"
 
 
 def nothing_left(diagnosis: Diagnosis) -> str:

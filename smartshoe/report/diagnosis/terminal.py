@@ -14,20 +14,24 @@ from smartshoe.display import sure
 from smartshoe.models.effects import in_words, listed
 from smartshoe.report.diagnosis._sentences import (
     INTERVALS,
+    LIKELIHOOD,
     comparison,
     fault_text,
-    for_this_one,
     gain_text,
     heading,
     how_much,
     is_free_form,
+    limits_of_the_force,
+    meanings,
+    not_in_the_model,
     parameter_text,
     shares_text,
     turned_over,
     unnamed,
+    what_is_left,
     why_this_one,
 )
-from smartshoe.report.tables import new_console, table_of
+from smartshoe.report.tables import USUAL, new_console, table_of
 from smartshoe.report.wording import sentence, words
 
 MOST_FAULTS = 12
@@ -50,7 +54,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
             f"in the {which} model without being causes, too small or too unsure for a name: {unnamed(diagnosis)}",
         )
     if diagnosis.leftover:
-        _line(console, f"what is left: {diagnosis.leftover}")
+        _line(console, what_is_left(diagnosis))
     rows = comparison(diagnosis)
     if rows:
         table = _wrapping("before and after, on data that was not fitted", ["", "baseline", "extended", "change"])
@@ -61,7 +65,10 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
         _line(console, shares_text(diagnosis))
     _several(console, "faults of the data", [fault_text(fault) for fault in diagnosis.data_faults])
     # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
-    _several(console, "limits of this data", diagnosis.limits_of_the_rest, most=None)
+    of_the_force = limits_of_the_force(diagnosis)
+    others = [one for one in diagnosis.limits_of_the_rest if one not in of_the_force]
+    _several(console, "where the calibration's force may be off", of_the_force, most=None)
+    _several(console, "limits of this data", others, most=None)
     _several(console, "recordings that were left out", diagnosis.left_out)
     if diagnosis.next_experiment is not None:
         _several(console, "what to do next", [diagnosis.next_experiment.says])
@@ -91,6 +98,7 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
         "causes, the largest first; errors on data that was not fitted; 95 % intervals in brackets",
         ["cause", "parameter", "value", "error falls by", "sure", "or it is"],
     )
+    table.columns[2].no_wrap = console.width >= USUAL  # a number and its interval on one line, where there is room
     for cause in diagnosis.causes:
         shown = [(words(name), parameter_text(value)) for name, value in cause.parameters.items()] or [("–", "–")]
         if is_free_form(cause):
@@ -105,9 +113,15 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
     console.print()
     console.print(table)
     _line(console, INTERVALS)
-    for text in (turned_over(diagnosis), *map(_about, diagnosis.causes)):
-        if text:
-            _line(console, text)
+    if turned := turned_over(diagnosis):
+        _line(console, turned)
+    for cause in diagnosis.causes:
+        _line(console, _about(cause))
+        for text in (_parameters(cause), not_in_the_model(cause)):
+            if text:
+                _line(console, f"  {text}")
+    if any(rival.says in why_this_one(cause) for cause in diagnosis.causes for rival in cause.rivals):
+        _line(console, LIKELIHOOD)
 
 
 def _wrapping(title: str, columns: Sequence[str]) -> Table:
@@ -119,12 +133,21 @@ def _wrapping(title: str, columns: Sequence[str]) -> Table:
 
 
 def _sure(cause: Cause) -> str:
-    return sure(cause.confidence) + (f", {for_this_one(cause)}" if cause.equivalents else "")
+    said = sure(cause.confidence)
+    return f"{said} one of these; if so, {sure(cause.law_confidence)} this one" if cause.equivalents else said
 
 
 def _about(cause: Cause) -> str:
     said = f"{in_words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
     return f"{said}; {cause.doubt}" if cause.doubt else said
+
+
+def _parameters(cause: Cause) -> str:
+    """What each parameter is; of a free form, whose numbers are not shown, nothing."""
+    if is_free_form(cause):
+        return ""
+    said = ", ".join(f"{words(name)} ({says})" for name, says in meanings(cause).items() if says)
+    return f"parameters: {said}" if said else ""
 
 
 def _several(console: Console, heading: str, lines: Sequence[str], most: int | None = MOST_FAULTS) -> None:
