@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, Index, Mask, numbers_of
 from smartshoe.display import Summarised, SummaryTable, first_names, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.stamps import GAP, rounded_grid_step_s, usual_step_s
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
 
 if TYPE_CHECKING:
@@ -236,12 +238,12 @@ class Recording(Summarised):
         """Time from the first sample to the last."""
         return float(self.time_s[-1] - self.time_s[0])
 
-    @property
+    @cached_property
     def sample_time_s(self) -> float:
-        """The median step."""
+        """The median step, or that of the even grid from which time was rounded: `usual_step_s` of it."""
         if len(self) < 2:
             raise InputError(f"{self.label} holds one sample: a signal needs two at least")
-        return float(np.median(np.diff(self.time_s)))
+        return usual_step_s(self.time_s)
 
     @property
     def sample_rate_hz(self) -> float:
@@ -387,11 +389,11 @@ def column_name(channel: Channel) -> str:
 def sample_rate_of(time_s: Array) -> float:
     """Samples a second while none is missing, in Hz, of time stamps (n,), two at least.
 
-    By the mean step, since stamps may be rounded: to milliseconds those of 90 Hz are 11 ms apart more often than not.
-    Steps that are nearly two of the median's, or more, are gaps.
+    By the grid that they were rounded from, where they were: to milliseconds those of 90 Hz are 11 ms apart more often
+    than not. Else by the mean step; steps that are nearly two of the median's, or more, are gaps.
     """
-    steps = np.diff(time_s)
-    return float(1.0 / np.mean(steps[steps < 1.75 * np.median(steps)]))
+    step_s, steps = rounded_grid_step_s(time_s), np.diff(time_s)
+    return 1.0 / (float(np.mean(steps[steps < GAP * np.median(steps)])) if step_s is None else step_s)
 
 
 __all__ = [

@@ -99,7 +99,8 @@ def say_what_strikes(recordings: Sequence[Recording]) -> None:
                 low, high = channel.values.min(), channel.values.max()
                 warn(
                     f"the load of {recording.label} goes from {low:.4g} to {high:.4g} {channel.unit.symbol}:"
-                    " compression is positive here; if it is compression, turn it with --force '-COLUMN'"
+                    " compression is positive here, so turn its sign if it presses, by a minus before its column's name"
+                    " (--force '-COLUMN')"
                 )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
+from smartshoe.units import find_unit
 
 MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "-", "--", "---"})
 _INTEGER = re.compile(r"[+-]?\d+(?:[eE][+-]?\d+)?", re.ASCII)
@@ -22,6 +23,7 @@ _THOUSANDS = {
     ",": re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+,\d*", re.ASCII),
 }
 _GROUPS = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+", re.ASCII)
+_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\W\d].*|[°%].*)")
 _PLAIN_NUMBERS = re.compile(r"[0-9eE+\-., \n]*", re.ASCII)
 
 
@@ -35,6 +37,14 @@ def is_number(cell: str) -> bool:
         or _THOUSANDS[","].fullmatch(cell)
         or _INFINITE.fullmatch(cell)
     )
+
+
+def split_unit(cell: str) -> tuple[str, str]:
+    """A cell's number and unit, as of ``12.3 N``; ('', '') where it is no number with a unit that is known."""
+    match = _WITH_UNIT.fullmatch(cell)
+    if match and is_number(match[1]) and find_unit(match[2]) is not None:
+        return match[1], match[2]
+    return "", ""
 
 
 def is_missing(cell: str) -> bool:
@@ -169,6 +179,35 @@ class _NumberTable:
                 f"{self.path}: cells with several points in {_lines([self.lines[row] for row in several])} of column"
                 f" {self.names[index]} have no certain reading: export the file again without thousands marks"
             )
+
+
+def without_units(
+    path: Path, name: str, unit: str, cells: Sequence[str], lines: Sequence[int]
+) -> tuple[Sequence[str], str]:
+    """A column's ``cells`` (n,), which stand on ``lines`` (n,), without the unit that all carry, and the column's unit.
+
+    Missing cells carry none. Raises `FormatError` with the line of the first cell whose unit is not that of the cells
+    above it, or not that of the header, whose text is ``unit`` ('' where it gives none).
+    """
+    first = next((cell for cell in cells if not is_missing(cell)), "")
+    said = split_unit(first)[1]
+    if not said:
+        return cells, unit
+    if find_unit(unit) not in (None, find_unit(said)):
+        raise FormatError(
+            f"{path}, line {lines[cells.index(first)]}: {first!r} stands in column {name}, which is in {unit} by its"
+            " header: take the unit out of the header or out of the cells"
+        )
+    numbers = []
+    for cell, line in zip(cells, lines, strict=True):
+        number, own = split_unit(cell)
+        if own != said and not is_missing(cell):
+            raise FormatError(
+                f"{path}, line {line}: {cell!r} in column {name} is not in {said} as the cells above it are: write the"
+                " column in one unit"
+            )
+        numbers.append(number)
+    return numbers, said
 
 
 def numbers_of(path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> Numbers:

@@ -90,6 +90,12 @@ def _said_unit(sheet: Sheet, text: str, choice: str, option: str) -> Unit:
     found = find_unit(text)
     if found is None and option == "--sensor" and text.strip():
         found = declared(text.strip())
+    weight = _weight_of(text, option)
+    if found is None and weight is not None:
+        raise UnitError(
+            f"{sheet.path}: unit {text!r} in {option} {choice!r} is a mass: write '[{weight.symbol}]' for what"
+            " it weighs"
+        )
     if found is None:
         raise UnitError(
             f"{sheet.path}: unit {text!r} in {option} {choice!r} is not known: use one such as {_usual(option)}"
@@ -97,9 +103,15 @@ def _said_unit(sheet: Sheet, text: str, choice: str, option: str) -> Unit:
     return found
 
 
+def _weight_of(text: str, option: str) -> Unit | None:
+    """Of a load the unit of force that a mass weighs whose unit is ``text``: gf for g; None where it is no mass."""
+    weight = find_unit(f"{text.strip()}f") if option == "--force" else None
+    return weight if weight is not None and weight.quantity == "force" else None
+
+
 def _usual(option: str) -> str:
     """Units of what an option names, for a person whose own is not known."""
-    return _USUAL.get(option, "mbar, V, counts, ohm or mm")
+    return _USUAL.get(option, "mbar, V, ohm or mm, and counts for bare numbers")
 
 
 def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:
@@ -116,10 +128,15 @@ def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:
 def need_unit(sheet: Sheet, found: Pick, option: str, example: str) -> Unit:
     """The pick's unit; raises `InputError` where neither file nor user gives one."""
     if found.unit is None:
-        name = sheet.columns[found.index].name
+        name, known, also = sheet.columns[found.index].name, "", ""
+        if option == "--sensor":  # its unit may be any, also the ending of its name or the name itself
+            itself, ending = find_unit(name), name.rpartition("_")[2]
+            example = example if itself is None else itself.symbol
+            if ending not in ("", name):
+                known, also = " that is known", f", or '{name}[{ending}]' if {ending} is one"
         raise InputError(
-            f"{sheet.path} gives column {name!r} no unit: add its own in brackets, for example"
-            f" {option} '{name}[{example}]' (units such as {_usual(option)})"
+            f"{sheet.path} gives column {name!r} no unit{known}: add its own in brackets, for example"
+            f" {option} '{name}[{example}]' (units such as {_usual(option)}){also}"
         )
     return found.unit
 
@@ -128,8 +145,10 @@ def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example
     """The pick's unit; raises `UnitError` where it is of another ``quantity``, and as `need_unit` does."""
     in_unit = need_unit(sheet, found, option, example)
     if in_unit.quantity != quantity:
-        also = ""
-        if in_unit.quantity == "unknown":
+        also, weight = "", _weight_of(in_unit.symbol, option)
+        if weight is not None:
+            also = f", or write '[{weight.symbol}]' behind its name for what such a mass weighs"
+        elif in_unit.quantity == "unknown":
             also = f", or say in brackets what it is in ({_usual(option)})"
         if quantity == "force" and in_unit.quantity == "length":  # a unit that is stretched is diagnosed as any other
             also = f", or take the unit out of its title and say '[{example}]' to use its numbers in the load's place"

@@ -109,6 +109,7 @@ FAULTS = [
     ({"time": "Load"}, UnitError, "is in N, which is no time"),
     ({"force": "Load[kN]"}, UnitError, "is in N by the file"),
     ({"force": "bare[furlong]"}, UnitError, "furlong"),
+    ({"force": "bare[g]"}, UnitError, r"unit 'g' in --force 'bare\[g\]' is a mass: write '\[gf\]'"),
     ({"force": "Load", "sensors": ["Load"]}, InputError, "chosen twice"),
 ]
 
@@ -119,6 +120,26 @@ def test_choices_that_do_not_fit(choices, error, says: str) -> None:
         recording_from(sheet("time|s", "Load|N", "Pin|V", "bare", "way|mm"), **choices)
     assert caught.value.exit_status == 3
     assert "log.tdms" in str(caught.value)
+
+
+def test_a_header_in_grams_says_how_their_weight_is_written() -> None:
+    log = sheet("time|s", "Weight|g", "Pin|V")
+    with pytest.raises(UnitError, match=r"is in g, which is no force: .* write '\[gf\]' behind its name"):
+        recording_from(log, force="Weight")
+    assert recording_from(log, force="Weight[gf]").load.unit.symbol == "gf"
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("cap_fF", r"'cap_fF' no unit that is known: .*'cap_fF\[mbar\]' .*counts.*, or 'cap_fF\[fF\]' if fF is one"),
+        ("ADC", r"'ADC' no unit: .*'ADC\[counts\]'"),
+    ],
+)
+def test_a_reading_without_a_unit_says_what_its_own_name_suggests(name: str, says: str) -> None:
+    log = sheet("time|s", "Load|N", name)
+    with pytest.raises(InputError, match=says):
+        recording_from(log, sensors=[name])
 
 
 def test_compression_logged_negative_is_turned_only_in_machine_logs() -> None:

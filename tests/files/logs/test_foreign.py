@@ -143,7 +143,29 @@ def test_text_columns_are_left_out_with_a_note(tmp_path: Path) -> None:
     assert "Operator" in recording.notes[0]
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("header", ["Time|Load|Sensor", "Time[s]|Load (N)|Sensor", "", "Time|Load|Sensor\ns|N|kPa"])
+def test_units_in_the_cells_are_the_columns(tmp_path: Path, delimiter: str, header: str) -> None:
+    rows = [f"{0.02 * row:.2f} s|{row * 12.5} N|" + (f"{row / 8}kPa" if row != 3 else "") for row in range(9)]
+    content = "\n".join([*([header] if header else []), *rows]).replace("|", delimiter)
+    recording = smartshoe.read(text(tmp_path, content))
+    assert recording.sample_time_s == pytest.approx(0.02)
+    assert recording.force_n.tolist() == [row * 12.5 for row in range(9)]
+    assert recording.sensor.unit.symbol == "kPa"
+    assert np.flatnonzero(np.isnan(recording.sensor.with_nan())).tolist() == [3]
+
+
+def test_units_in_cells_with_a_decimal_comma(tmp_path: Path) -> None:
+    recording = smartshoe.read(text(tmp_path, "Zeit;Kraft;Temp\n0,5 s;1,25 kN;20,5 °C\n1,5 s;2,5 kN;21 °C\n"))
+    assert recording.time_s.tolist() == [0.5, 1.5]
+    assert recording.force_n.tolist() == [1250.0, 2500.0]
+    assert recording["Temp"].values.tolist() == [20.5, 21.0]
+
+
 FAULTS = {
+    "Time,Load\n0 s,900 mN\n1 s,1.1 N\n": "line 3: '1.1 N' in column Load is not in mN as the cells above",
+    "Time,Load\n0 s,900 N\n1 s,901\n": "line 3: '901' in column Load is not in N as the cells above",
+    "Time,Load[kN]\n0 s,900 N\n1 s,901 N\n": "line 2: '900 N' stands in column Load, which is in kN by its header",
     "row,P_bar\n0,1.5\n1,1.6\n": "no column that is time",
     "Time,Load[N]\n0,1.5\n1,1.6\n": r"gives column 'Time' no unit.*'Time\[s\]'",
     "1;2;3\n4;5;6\n": r"--time '1\[ms\]'",

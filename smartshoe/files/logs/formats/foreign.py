@@ -12,7 +12,7 @@ import numpy as np
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
 from smartshoe.files.logs._moments import is_moment, seconds_of
-from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of
+from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of, split_unit, without_units
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import bracketed, even_rows, is_text, read_lines, split_cells
 from smartshoe.recording import split_column
@@ -33,6 +33,11 @@ def _without_trailing(cells: list[str]) -> list[str]:
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
+def _is_number(cell: str) -> bool:
+    """Whether a cell is a number, with its unit or without."""
+    return is_number(cell) or bool(split_unit(cell)[1])
+
+
 def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, list[list[str]]]:
     """The delimiter under which most cells of the later lines are numbers, and the rows that are as most are."""
     best: tuple[float, str | None, list[list[str]]] | None = None
@@ -41,7 +46,7 @@ def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, list[list[
         width, count = Counter(map(len, rows)).most_common(1)[0]
         even = [row for row in rows if len(row) == width]
         cells = [cell for row in even for cell in _without_trailing(row)]
-        numeric = sum(map(is_number, cells)) / len(cells)
+        numeric = sum(map(_is_number, cells)) / len(cells)
         if width < 2:
             continue
         score = numeric * count / len(rows)
@@ -131,7 +136,7 @@ def read(path: Path) -> Sheet:
     numbers = [number for number, _ in numbered]
     rows = even_rows(path, split_cells([line for _, line in numbered], delimiter), numbers, width)
 
-    has_header = any(not (is_number(cell) or is_missing(cell) or is_moment(cell)) for cell in rows[0])
+    has_header = any(not (_is_number(cell) or is_missing(cell) or is_moment(cell)) for cell in rows[0])
     names, units = [str(index + 1) for index in range(width)], [""] * width
     labels = [""] * width
     if has_header:
@@ -145,21 +150,22 @@ def read(path: Path) -> Sheet:
     if not rows:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
 
-    used, clocks = [], {}
+    used, clocks, cells = [], {}, []
     for index in range(width):
-        column = [row[index] for row in rows]
+        column: Sequence[str] = [row[index] for row in rows]
         if is_moment(column[0]) and not is_number(column[0]):
             clocks[index] = Column(
                 names[index], "s", seconds_of(path, names[index], column, numbers), label=labels[index]
             )
             said.setdefault(f"start of {names[index]}", column[0])
-        elif any(map(is_number, column)) or all(map(is_missing, column)):
+            continue
+        column, units[index] = without_units(path, names[index], units[index], column, numbers)
+        if any(map(is_number, column)) or all(map(is_missing, column)):
             used.append(index)
+            cells.append(column)
         else:
             notes.append(f"Column {names[index]} holds text and was left out.")
-    if len(used) < width:
-        rows = [[row[index] for index in used] for row in rows]
-    table = numbers_of(path, [names[index] for index in used], rows, numbers)
+    table = numbers_of(path, [names[index] for index in used], list(zip(*cells, strict=True)), numbers)
     read_ = dict(zip(used, table.columns, strict=True))
     columns = [
         clocks.get(index) or Column(names[index], units[index], read_[index], label=labels[index])

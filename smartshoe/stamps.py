@@ -1,0 +1,79 @@
+"""The step between time stamps, also where they were rounded: 120 Hz, written to four decimals, is no 8.3 ms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smartshoe.arrays import Array
+
+GAP = 1.75  # usual steps: where two stamps lie further apart a sample is missing
+_MOST_DIGITS = 12  # stamps with more were not rounded
+_PASSES = 3  # each with a better step, which numbers longer gaps
+_SAME = 1e-9  # of a span: last digits of a double
+
+
+def usual_step_s(time_s: Array) -> float:
+    """Time from a sample to the next, in s, of stamps (n,) that increase, two at least: the median step.
+
+    Where stamps were rounded it is the step of the even grid that they were rounded from.
+    """
+    step_s = rounded_grid_step_s(time_s)
+    return float(np.median(np.diff(time_s))) if step_s is None else step_s
+
+
+def rounded_grid_step_s(time_s: Array) -> float | None:
+    """The step in s of the even grid from which stamps (n,) were rounded; None where the median step is as good.
+
+    Each stamp is numbered by the steps before it, and the grid's step is the slope of stamps over numbers. A gap that
+    is no whole number of steps parts the stamps, and all parts have one slope. The median step stands where its own
+    grid explains the stamps to within their rounding; where it is off by more than rounding moves a step; and where the
+    numbers are not sure, since stamps lie half a step off the grid or were rounded to more than half a step.
+    """
+    steps = np.diff(time_s)
+    median, span = float(np.median(steps)), float(time_s[-1] - time_s[0])
+    if abs(span - median * steps.size) <= _SAME * span:
+        return None
+    rounding = _rounding_s(time_s)
+    step = float(np.mean(steps[steps < GAP * median]))
+    for _ in range(_PASSES):
+        numbers = np.rint(steps / step)
+        parted = (numbers > 1.0) & (np.abs(steps - numbers * step) > 2.0 * rounding)
+        part = np.concatenate([[0], np.cumsum(parted)])
+        number, stamp = _centred(np.concatenate([[0.0], np.cumsum(numbers)]), part), _centred(time_s, part)
+        if numbers.min() < 1.0 or not number.any():
+            return None
+        step = float(number @ stamp) / float(number @ number)
+    if max(float(np.abs(stamp - number * step).max()), rounding) > 0.5 * step:
+        return None
+    off, longest = abs(step - median), 2.0 * float(np.abs(number).max())
+    return step if off <= rounding < off * longest else None
+
+
+def _centred(values: Array, part: Array) -> Array:
+    """``values`` (n,) less the mean of those of their ``part`` (n,), whole numbers from 0 on."""
+    out: Array = values - (np.bincount(part, values) / np.bincount(part))[part]
+    return out
+
+
+def _rounding_s(time_s: Array) -> float:
+    """What the last digit of rounded stamps (n,) counts, in s, where it counts most; 0 where they were not rounded.
+
+    Programs write so many decimals, or so many digits, of which fewer are decimals as time goes on.
+    """
+    size = np.abs(time_s)
+    largest = float(size.max())
+    noise = 4.0 * float(np.spacing(largest))
+    first = 10.0 ** np.floor(np.log10(np.where(size > 0.0, size, largest)))  # what each stamp's first digit counts
+
+    def last(units: Array, unit: float) -> float:
+        for _ in range(_MOST_DIGITS):
+            counted, least = time_s / units, 1e-6 + noise / units
+            if np.all(np.abs(counted - np.rint(counted)) <= least):
+                return unit
+            units, unit = units / 10.0, unit / 10.0
+        return 0.0
+
+    return max(last(np.ones(1), 1.0), last(first, float(first.max())))
+
+
+__all__ = ["GAP", "rounded_grid_step_s", "usual_step_s"]
