@@ -154,9 +154,9 @@ def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, th
     if worst_n <= thresholds.clear * max(told_n, thresholds.tolerable * model.full_scale_load_n):
         return []
     return [
-        "a calibration takes one zero for all recordings, and begins each as if the unit had borne nothing before: so"
-        f" the force of {name} is off by {worst_n:.2g} N (rms), where {told_n:.2g} N is told with its own zero and past"
-        " set apart (zero the load cell and the sensor before each, and begin it with a rest)"
+        "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
+        f" {name} is off by {worst_n:.2g} N (rms); with its own zero, and what it bore before, allowed for it would be"
+        f" {told_n:.2g} N (zero the load cell and the sensor before each recording, and begin it with a rest)"
     ]
 
 

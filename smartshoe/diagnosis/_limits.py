@@ -70,8 +70,8 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
         parameter, value = part.kind_ends_at[0]
         at = f"{in_words(parameter.name)} at {value:g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
         return (
-            f"{in_words(name.effect.name)} fits best with its {at}, where it turns into an effect of another kind, so"
-            " that it is not named"
+            f"{in_words(name.effect.name)} fits best with its {at}, the end of its range, beyond which it acts like"
+            " another effect, so that it is not named"
         )
     if model.relaxing_share < 0.0 and part.name in dict(arms_of(model)):
         return _unnamed(
@@ -298,7 +298,7 @@ def refusals_of(found: Inference) -> list[str]:
         said.append(f"these effects largely cancel one another, so that none is named: {listed(found.undone)}")
     if found.refused:
         said.append(
-            "tried and taken out again, not borne out by fitted recordings or load cycles that are left out in turn, or"
-            f" too small there for the loads that are held out: {listed(dict.fromkeys(found.refused))}"
+            f"tried and left out again: {listed(dict.fromkeys(found.refused))}: of no help in foreseeing recordings or"
+            " load cycles that were left out in turn, or too small there for what the held-out loads ask of them"
         )
     return said

@@ -111,6 +111,7 @@ def diagnosed(
     undone = undone_of(force.model, fine[0])
     zeros_apart = abs(_mean_offset(sessions, undone) - _mean_offset(sessions, force.model))
     has_own = bool(force.passed_over) or zeros_apart >= thresholds.material
+    of_force = _limits_of_the_force(found, given, named, extended, force, outcome, left, apart)
     says = sentence_of(
         verdict,
         names_in(causes, len(minor)),
@@ -139,7 +140,8 @@ def diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
         ),
-        limits=_limits(found, given, named, extended, force, outcome, left, apart),
+        limits=(*given.limits, *of_force, *_limits_of_the_names(found, given, named, extended)),
+        limits_of_the_force=of_force,
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
@@ -245,7 +247,7 @@ def _outcome(
     return _Outcome(verdict, won, elsewhere, unproven)
 
 
-def _limits(
+def _limits_of_the_force(
     found: Inference,
     given: Prepared,
     named: Chosen,
@@ -255,29 +257,34 @@ def _limits(
     left: _LeftOver,
     apart: OwnZeros | None,
 ) -> tuple[str, ...]:
-    """All that limits the diagnosis, in sentences."""
+    """What limits the force that a calibration gives: loads beyond those fitted, what is not undone, zeros, gains."""
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
-    by_wall = wall_ratio_of(extended, given.sessions, thresholds)
     undone = extended if force.is_plain else force.model
     zero = _mean_offset(given.sessions, undone_of(force.model, given.fine[0]))
     of_causes = {one.member.name for one in named.names}
-    of_model = end_of_range_of(extended, given.sessions, thresholds), bent_to_the_end_of(extended), by_wall
     return (
-        *given.limits,
         *([worse_of(won, ways)] if won.is_rejected else []),
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
         *force_of(force),
         *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
         *([] if force.is_plain else going_on_of(force.model, given.fine, of_causes, thresholds)),
-        *named.limits,
-        *(said for said in of_model if said is not None),
+        *named.of_zeros,
         *own_gains_of(found.own_gains),
         *own_zeros_of(apart, given.scale),
         *as_calibrated(given.fine, force.model, zero, thresholds),
         *zero_changes_said(found.zero_changes),
-        *refusals_of(found),
     )
+
+
+def _limits_of_the_names(found: Inference, given: Prepared, named: Chosen, extended: ExtendedModel) -> tuple[str, ...]:
+    """What limits the names: causes that are none, models at their ends, what was refused."""
+    of_model = (
+        end_of_range_of(extended, given.sessions, given.thresholds),
+        bent_to_the_end_of(extended),
+        wall_ratio_of(extended, given.sessions, given.thresholds),
+    )
+    return (*named.limits, *(said for said in of_model if said is not None), *refusals_of(found))
 
 
 def _left_of_what_was_fitted(

@@ -25,7 +25,7 @@ from smartshoe.diagnosis._zero import Zero, creeping
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """``names`` and ``zeros`` that are causes; ``limits``: what is said of those that fit and are none.
+    """``names`` and ``zeros`` that are causes; ``limits`` and ``of_zeros``: what is said of such as fit and are none.
 
     ``nameless``: how far the largest that is of no kind with a name moves the reading, rms, a share of full scale.
     """
@@ -34,6 +34,7 @@ class Chosen:
     zeros: tuple[Zero, ...] = ()
     limits: tuple[str, ...] = ()
     nameless: float = 0.0
+    of_zeros: tuple[str, ...] = ()
 
     def without(self, why: Callable[[Name], str | None]) -> Chosen:
         """Without the names for which there is a reason why they are none, which is said."""
@@ -64,7 +65,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
         for one in zeros
         if not (one.is_past or one.led_from or (found.zero_changes and one.effect.shifts == "reading"))
     )
-    seen = Chosen(names, kept, (*before, *seen.limits, *past, *led), seen.nameless)
+    seen = Chosen(names, kept, (*before, *seen.limits), seen.nameless, (*past, *led))
     return seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
 
 

@@ -20,6 +20,7 @@ from smartshoe.integrity._scales import (
 )
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
+from smartshoe.stamps import usual_step_s
 
 
 def toggling(thresholds: Thresholds) -> float:
@@ -141,8 +142,8 @@ class View:
 
     @cached_property
     def step_s(self) -> float:
-        """Median sampling step."""
-        return float(np.median(np.diff(self.time_s)))
+        """The usual sampling step."""
+        return usual_step_s(self.time_s)
 
     @cached_property
     def near(self) -> int:

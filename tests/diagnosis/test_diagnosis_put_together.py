@@ -563,8 +563,11 @@ def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
 def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     parts: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    parts.not_undone = ["not undone"]
-    assert _run_diagnosis(parts).limits == ("limit", "not undone")
+    parts.not_undone, parts.wall_ratio = ["not undone"], "no such wall"
+    told = _run_diagnosis(parts)
+    assert told.limits == ("limit", "not undone", "no such wall")
+    assert told.limits_of_the_force == ("not undone",)  # the wall is the model's
+    parts.wall_ratio = None
     (model, step_s), _ = parts.seen["not_undone_of"]
     assert model.names == parts.found.fit.model.names
     assert step_s == 0.05

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,12 +16,16 @@ from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds, _gains_and_zeros
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gains_and_zeros import (
+    OwnGain,
+    ZeroChange,
     _Gained,
     _is_abrupt,
+    _loaded_about,
     changes_of,
     foretells,
     gains_of,
     may_differ,
+    time_of,
     with_changes,
     with_likelier_gains,
     zero_changes_of,
@@ -126,7 +132,7 @@ def test_a_fits_cost_is_the_squared_error_with_every_nuisance_written_out(gained
 def test_gains_and_the_effect_beside_them_come_out_of_a_fit(gained: list[Session]) -> None:
     start = MODEL.with_part(effect("gas_compression"), effect("gas_compression").begun())
     found = fit(Likelihood(gained, SD, MODEL, STANDARD), start)
-    gains = gains_of(gained, found.model)
+    gains = gains_of(gained, found.model, STANDARD)
     assert [one.recording for one in gains] == ["run_0", "run_1", "run_2"]
     shares = np.array([one.share for one in gains])
     assert_allclose(shares - shares.mean(), [0.02, -0.01, -0.01], atol=0.002)
@@ -195,10 +201,19 @@ def test_a_gain_that_changes_is_told_with_the_moment() -> None:
         gained = likelier  # gains of their own first, then in what is found beside them what changes
     assert [len(one.gain_changes) for one in gained] == [0, 1, 0]
     model = fit(Likelihood(gained, SD, CURVED, STANDARD), CURVED).model
-    (change,) = changes_of(gains_of(gained, model))
+    (change,) = changes_of(gains_of(gained, model, STANDARD))
     assert change.recording == "run_1"
-    assert change.begins_s == pytest.approx(21.0, abs=1.0)
+    assert change.begins_s - change.unseen_s - 1.0 <= 21.0 <= change.begins_s + 1.0
     assert change.share == pytest.approx(0.04, abs=0.005)
+
+
+def test_a_gain_that_changes_without_load_is_told_within_the_stretch_that_does_not_show_it() -> None:
+    load = np.repeat([0.0, 0.5, 0.01, 0.7, 0.0], 10)
+    session: Any = SimpleNamespace(conditions=SimpleNamespace(load=load))
+    for at, about in ((25, (19, 30)), (20, (19, 30)), (30, (19, 30)), (15, (14, 15)), (3, (3, 10)), (45, (39, 45))):
+        assert _loaded_about(session, at, STANDARD) == about
+    assert time_of(OwnGain("a", 84.04, 0.02, True, 15.08)) == "between 68.96 and 84.04 s, without load"
+    assert time_of(OwnGain("a", 84.04, 0.02, True)) == time_of(ZeroChange("a", 84.04, 0.02)) == "at 84.04 s"
 
 
 def test_zeros_that_change_are_told_with_the_moment_and_are_no_gains() -> None:
@@ -213,7 +228,7 @@ def test_zeros_that_change_are_told_with_the_moment_and_are_no_gains() -> None:
     assert not any(one.own_gain_sd or one.gain_changes for one in told)
     assert with_likelier_gains(_state(CURVED, list(told)), told) is None
     model = fit(Likelihood(told, SD, CURVED, STANDARD), CURVED).model
-    assert not gains_of(told, model)
+    assert not gains_of(told, model, STANDARD)
     first, second = zero_changes_of(told, model)  # the largest first
     assert (first.recording, second.recording) == ("run_1", "run_1")
     assert (first.begins_s, first.share) == (pytest.approx(14.0, abs=4 * STEP_S), pytest.approx(0.015, abs=0.002))

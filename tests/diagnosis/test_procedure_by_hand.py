@@ -227,15 +227,15 @@ def test_what_was_taken_out_again_is_said_once() -> None:
     found.refused = ("linear_leak", "delay", "linear_leak")
     (said,) = refusals_of(found)
     assert said == (
-        "tried and taken out again, not borne out by fitted recordings or load cycles that are left out in turn, or too"
-        " small there for the loads that are held out: linear leak, delay"
+        "tried and left out again: linear leak, delay: of no help in foreseeing recordings or load cycles that were"
+        " left out in turn, or too small there for what the held-out loads ask of them"
     )
     found.undone = ("rate_gain", "delay")
     undone = "these effects largely cancel one another, so that none is named: rate gain, delay"
     assert refusals_of(found) == [undone, said]
     found.undone, found.refused = (), ("flexible_lag", "linear_leak")
     (said,) = refusals_of(found)
-    assert said.endswith(" held out: lag of free form, linear leak")
+    assert said.startswith("tried and left out again: lag of free form, linear leak: of no help")
     found.can_validate = False
     (said,) = refusals_of(found)
     assert "no cause can be told" in said

@@ -102,8 +102,8 @@ def test_an_effect_is_not_named_where_it_turns_into_one_of_another_kind(
     assert said(inside) is None
     if at_bound is not None:
         assert said(at_bound) == (
-            f"{name.replace('_', ' ')} fits best with its {told}, where it turns into an effect of another kind, so"
-            " that it is not named"
+            f"{name.replace('_', ' ')} fits best with its {told}, the end of its range, beyond which it acts like"
+            " another effect, so that it is not named"
         )
 
 
@@ -247,7 +247,11 @@ def test_a_zero_that_is_seen_later_on_is_led_back_from_no_load() -> None:
     shift = shift_of("reading")
     for led_from, begins, asked in (
         (0.019, "without load the reading stands at 7 mbar (5 %", "before the first load"),
-        (0.021, "led back to no load from 2.1 % of it, the reading stands at 7 mbar (5 %", "without load"),
+        (
+            0.021,
+            "led back to no load from 2.1 % of it, the reading stands at 7 mbar (5 %",
+            "without load that the sensor can read",
+        ),
     ):
         zero = Zero(shift, 0.05, 0.01, 0.05, ("load_cell_tare",), led_from=led_from)
         said = led_back_of(zero, replace(SCALE, reading=140.0), STANDARD)

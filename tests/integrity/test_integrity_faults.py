@@ -352,6 +352,17 @@ def test_one_tone_is_one_line_however_short_the_rests_are():
     assert told.count(" Hz") - told.count("Hz mains") == 1
 
 
+def test_a_tone_beside_rounded_stamps_has_its_own_frequency():
+    """120 Hz to four decimals: most steps are 8.3 ms, which would be 120.48 Hz, and the tone at 50.2 Hz."""
+    time_s = np.arange(12_000) / 120.0
+    load = 200.0 * np.clip(np.sin(2 * np.pi * time_s / 8.0) * 3.0, -1.0, 1.0) + 200.0
+    rng = np.random.default_rng(8)
+    reading = 0.2 * load + 0.5 * np.sin(2 * np.pi * 50.0 * time_s) + rng.normal(0.0, 0.02, time_s.size)
+    rounded = {"time_s": time_s.round(4), "force_n": load + rng.normal(0.0, 0.05, load.size), "pressure_mbar": reading}
+    (told,) = [fault.says for fault in examine([Recording.from_arrays(**rounded)]).faults if fault.kind == "hum"]
+    assert float(told.split(" at ")[1].split(" Hz")[0]) == pytest.approx(50.0, abs=0.05)
+
+
 def test_names_the_mains_frequency_that_a_line_may_be():
     assert aliases(50.0, 100.0, 100.0)[0] == "50 Hz mains"
     assert aliases(40.0, 100.0, 100.0)[0] == "60 Hz mains"

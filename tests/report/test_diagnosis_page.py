@@ -105,7 +105,7 @@ def test_what_to_do_next_says_where_the_calibration_s_force_may_be_off(
     of_data = "one loading rate only: nothing can be said of rate dependence"
 
     def told(*limits: str) -> str:
-        made = replace(case(name), limits=limits)
+        made = replace(case(name), limits=limits, limits_of_the_force=limits[1:])
         text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
         return text[text.index("What to do next") : text.index("Where the error sits")]
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -14,23 +13,9 @@ from diagnoses_made import BASELINE, LEAK, LEAK_CAUSE, PLAY_CAUSE, case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smartshoe.diagnosis import Gain, Rival, Thresholds, _force
-from smartshoe.diagnosis._excitation import Excitation
-from smartshoe.diagnosis._force import Compensation, ForceError, as_calibrated, force_of, not_undone_of
-from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
-from smartshoe.diagnosis._limits import (
-    elsewhere_of,
-    led_back_of,
-    own_gains_of,
-    own_zeros_of,
-    past_of,
-    refusals_of,
-    worse_of,
-    zero_changes_said,
-)
-from smartshoe.diagnosis._zero import OwnZeros, Zero
+from smartshoe.diagnosis import Gain, Rival
 from smartshoe.display import sure
-from smartshoe.models.effects import effect, listed, shift_of
+from smartshoe.models.effects import effect, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
@@ -41,7 +26,6 @@ from smartshoe.report.diagnosis._sentences import (
     heading,
     interval,
     likelier,
-    limits_of_the_force,
     not_in_the_model,
     nothing_left,
     parameter_text,
@@ -123,44 +107,6 @@ def test_parameters_of_an_equation_that_is_not_in_the_model_are_told_as_such() -
         replace(law, parameters=block),
     ):  # fmt: skip
         assert not_in_the_model(other) == ""
-
-
-def test_each_limit_of_the_calibration_s_force_is_told_by_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the sentences of those that make them: what is reworded there must be known here."""
-    lag = BASELINE.with_part("delay", np.array([0.1]))
-    errors_n = ForceError(5.0, 6.0)
-    plain_one = Compensation(BASELINE, errors_n, errors_n, errors_n, is_plain=True)
-    zero = Zero(shift_of("reading"), 0.05, 0.01, 0.05)
-    scale: Any = SimpleNamespace(reading=70.0, unit=SimpleNamespace(symbol="mbar"), zero=0.0)
-    thresholds = Thresholds()
-    rest: Any = SimpleNamespace(
-        is_judged=True, rates_per_s=(1.0, 2.0), present={"holds", "repeats"}, goes_with_the_clock=False, peaks=(1, 2)
-    )
-    refused: Any = SimpleNamespace(can_validate=True, undone=("delay",), refused=("sensor_lag",))
-    monkeypatch.setattr(_force, "_off_by_n", lambda *_: np.full(4, 8.4))
-    monkeypatch.setattr(_force, "_off_n", lambda *_: np.full(4, 1.7))
-    monkeypatch.setattr(_force, "_compensator", lambda *_: None)
-    there: Any = SimpleNamespace(usable=np.ones(4, dtype=bool), recording=SimpleNamespace(name="u02h"))
-    of_force = [
-        *not_undone_of(lag, 0.01),
-        *force_of(plain_one),
-        *force_of(replace(plain_one, rejected=errors_n)),
-        *force_of(replace(plain_one, is_plain=False, passed_over=("sensor_lag",))),
-        *as_calibrated([there], BASELINE, 0.0, thresholds),
-        worse_of(Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0)), None),
-        elsewhere_of(0.19, 0.015, None),
-        past_of(zero, scale),
-        led_back_of(zero, scale, thresholds),
-        led_back_of(replace(zero, led_from=0.4), scale, thresholds),
-        *own_gains_of([OwnGain("a", 0.0, -0.01), OwnGain("b", 0.0, 0.02)]),
-        *own_zeros_of(OwnZeros(("a", "b"), np.array([0.0, 0.03])), scale),
-        *zero_changes_said([ZeroChange("a", 30.0, 0.02)]),
-        *Excitation.limits(rest),
-    ]
-    assert len(of_force) == 14
-    others = ("one loading rate only: nothing can be said of rate dependence", *refusals_of(refused))
-    made = replace(case("one cause"), limits=(*of_force, *others))
-    assert limits_of_the_force(made) == of_force
 
 
 def test_what_is_left_is_told_of_the_model_that_leaves_it() -> None:

@@ -71,7 +71,10 @@ def test_the_terminal_tells_what_parameters_are_and_what_likelihood_is(
     monkeypatch.delenv("COLUMNS", raising=False)
     print_diagnosis(case("two causes"))
     said = capsys.readouterr().out
-    assert "  parameters: leak rate (share of the gauge pressure lost a second)\n" in said
+    assert (
+        "  parameters: leak rate (share of the air's deformation lost a second; a held reading falls at 1 - 1/N of it"
+        in said
+    )
     assert "half height (half of the major loop's greatest height), width (half width of the play" in said
     assert said.count("are differences of −2 log likelihood") == 1
     assert "0.002000 [0.001941, 0.002059] 1/s" in said
@@ -82,7 +85,7 @@ def test_the_terminal_tells_what_parameters_are_and_what_likelihood_is(
 
 def test_where_the_force_may_be_off_stands_apart_from_other_limits(capsys: pytest.CaptureFixture[str]) -> None:
     off = "no compensator takes off the delay"
-    print_diagnosis(replace(case("one cause"), limits=("one rate only", off)))
+    print_diagnosis(replace(case("one cause"), limits=("one rate only", off), limits_of_the_force=(off,)))
     said = capsys.readouterr().out
     assert f"where the calibration's force may be off\n- {off}\n" in said
     assert "limits of this data\n- one rate only\n" in said

@@ -57,7 +57,6 @@ def write_diagnosis_page(
         "said": said,
         "numbers": _numbers(diagnosis),
         "gained": sentences.what_was_gained(diagnosis),
-        "of_the_force": sentences.limits_of_the_force(diagnosis),
         "left_over": sentence(sentences.what_is_left(diagnosis)),
         "nothing_left": sentences.nothing_left(diagnosis),
         "why_no_name": sentences.why_no_name(diagnosis),

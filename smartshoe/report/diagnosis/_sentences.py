@@ -34,12 +34,6 @@ LIKELIHOOD = (
     " “Fits worse by” takes equations as exact, which they are not, so that it must be much more than 10."
 )
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
-# Words of a limit that says where the calibration's force may be off: what it does not undo, zeros, gains, its range.
-OF_THE_FORCE = (
-    "calibrat", "compensat", "no model foresees", "a zero of its own", "zero, tare", "the zero stands",
-    "led back to no load", "without load the reading stands", "end of its range", "held-out recordings are off",
-    "the gain within a file", "is extrapolated",
-)  # fmt: skip
 
 
 def heading(diagnosis: Diagnosis) -> str:
@@ -98,11 +92,6 @@ def meanings(cause: Cause) -> dict[str, str]:
     valued = cause.effect if cause.part is None else effect(cause.part)
     says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
     return {name: says.get(name, "") for name in cause.parameters}
-
-
-def limits_of_the_force(diagnosis: Diagnosis) -> list[str]:
-    """The limits that say where the calibration's force may be off: whoever uses it must know them."""
-    return [one for one in diagnosis.limits_of_the_rest if any(words in one for words in OF_THE_FORCE)]
 
 
 def unit_of(symbol: str) -> str:

@@ -21,7 +21,6 @@ from smartshoe.report.diagnosis._sentences import (
     heading,
     how_much,
     is_free_form,
-    limits_of_the_force,
     meanings,
     not_in_the_model,
     parameter_text,
@@ -65,7 +64,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
         _line(console, shares_text(diagnosis))
     _several(console, "faults of the data", [fault_text(fault) for fault in diagnosis.data_faults])
     # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
-    of_the_force = limits_of_the_force(diagnosis)
+    of_the_force = diagnosis.limits_of_the_force
     others = [one for one in diagnosis.limits_of_the_rest if one not in of_the_force]
     _several(console, "where the calibration's force may be off", of_the_force, most=None)
     _several(console, "limits of this data", others, most=None)
