@@ -91,3 +91,11 @@ def test_scattered_stamps_that_were_not_rounded_keep_the_median_step() -> None:
     time_s = np.arange(1000) / 33.0 + np.random.default_rng(2).uniform(-0.004, 0.004, 1000)
     assert usual_step_s(time_s) == _median_s(time_s)
     assert sample_rate_of(time_s) == pytest.approx(33.0, rel=1e-3)
+
+
+def test_a_few_stamps_that_come_as_they_like_move_no_step():
+    """A log of 25 Hz in milliseconds that writes a row half a step early each time the machine turns."""
+    steps_s = np.full(874, 0.04)
+    steps_s[[150, 400, 700]] = 0.021
+    time_s = np.concatenate([[0.0], np.cumsum(steps_s)]).round(3)
+    assert usual_step_s(time_s) == _median_s(time_s)
