@@ -9,6 +9,7 @@ from smartshoe.arrays import Array
 GAP = 1.75  # usual steps: where two stamps lie further apart a sample is missing
 _MOST_DIGITS = 12  # stamps with more were not rounded
 _PASSES = 3  # each with a better step, which numbers longer gaps
+_HALF = 0.6  # of what the last digit counts: what rounding moves a stamp by, and the slope's own error
 _SAME = 1e-9  # of a span: last digits of a double
 
 
@@ -27,8 +28,8 @@ def rounded_grid_step_s(time_s: Array) -> float | None:
     Each stamp is numbered by the steps before it, and the grid's step is the slope of stamps over numbers. A gap that
     is no whole number of steps parts the stamps, and all parts have one slope. The median step stands where its own
     grid explains the stamps to within their rounding; where it is off by more than rounding moves a step; where the
-    other grid misses a stamp by more than twice their rounding, since it came as it liked; and where the numbers are
-    not sure, since stamps were rounded to more than half a step.
+    other grid misses a stamp by more than rounding does, since it came as it liked; and where the numbers are not sure,
+    since stamps were rounded to more than half a step.
     """
     steps = np.diff(time_s)
     median, span = float(np.median(steps)), float(time_s[-1] - time_s[0])
@@ -44,7 +45,7 @@ def rounded_grid_step_s(time_s: Array) -> float | None:
         if numbers.min() < 1.0 or not number.any():
             return None
         step = float(number @ stamp) / float(number @ number)
-    if float(np.abs(stamp - number * step).max()) > 2.0 * rounding or rounding > 0.5 * step:
+    if float(np.abs(stamp - number * step).max()) > _HALF * rounding or rounding > 0.5 * step:
         return None
     off, longest = abs(step - median), 2.0 * float(np.abs(number).max())
     return step if off <= rounding < off * longest else None
