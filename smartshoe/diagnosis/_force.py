@@ -36,14 +36,16 @@ class Compensation:
     """What a unit is compensated by: ``model``, run backwards, with its ``error``.
 
     ``model`` is the extended one, but for effects (``passed_over``) whose undoing does more harm than good, or the
-    plain one. ``before`` is the plain one's error, ``whole`` that of the extended one with all its effects.
-    ``rejected``: the error of the one that would be ``model``, where it is worse on what is held out.
+    plain one; ``undone`` is what of it a filter of readings undoes. ``before`` is the plain one's error, ``whole`` that
+    of the extended one with all its effects. ``rejected``: the error of the one that would be ``model``, where it is
+    worse on what is held out.
     """
 
     model: ExtendedModel
     error: ForceError
     before: ForceError
     whole: ForceError
+    undone: ExtendedModel
     passed_over: tuple[str, ...] = ()
     is_plain: bool = False
     rejected: ForceError | None = None
@@ -61,6 +63,11 @@ def compensation(
     """
     fine = [_without_clipped(one, extended, thresholds) for one in fine]
     before, whole = force_error(fine, plain), force_error(fine, extended)
+
+    def by_plain(rejected: ForceError | None = None) -> Compensation:
+        undone = undone_of(plain, fine[0])
+        return Compensation(plain, before, before, whole, undone, extended.names, is_plain=True, rejected=rejected)
+
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
     made_of_it = extended.noise / extended.gain * extended.full_scale_load_n
@@ -73,12 +80,12 @@ def compensation(
         model, least = others[best], off_n[best]
     is_nearer = bool(model.parts) and least <= (1.0 + thresholds.standing) * before.fitted_n
     if extended.parts and not is_nearer:
-        return Compensation(plain, before, before, whole, extended.names, is_plain=True)
+        return by_plain()
     error = whole if model is extended else force_error(fine, model)
     if error.held_out_n > (1.0 + thresholds.standing) * before.held_out_n:
-        return Compensation(plain, before, before, whole, extended.names, is_plain=True, rejected=error)
+        return by_plain(error)
     passed_over = tuple(name for name in extended.names if name not in model.names)
-    return Compensation(model, error, before, whole, passed_over)
+    return Compensation(model, error, before, whole, undone_of(model, fine[0]), passed_over)
 
 
 def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Session:

@@ -17,7 +17,6 @@ from smartshoe.diagnosis._force import (
     force_of,
     going_on_of,
     not_undone_of,
-    undone_of,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
@@ -108,8 +107,7 @@ def diagnosed(
     parameters, covariance = joint_parameters(adopted.fit, scale)
     force = compensation(fine, adopted.model, plain, thresholds)
     # What no compensator takes off, be it the room's warmth, is its zero's, on the mean of the recordings.
-    undone = undone_of(force.model, fine[0])
-    zeros_apart = abs(_mean_offset(sessions, undone) - _mean_offset(sessions, force.model))
+    zeros_apart = abs(_mean_offset(sessions, force.undone) - _mean_offset(sessions, force.model))
     has_own = bool(force.passed_over) or zeros_apart >= thresholds.material
     of_force = _limits_of_the_force(found, given, named, extended, force, outcome, left, apart)
     says = sentence_of(
@@ -148,7 +146,7 @@ def diagnosed(
         model=_with_offset(adopted.model, named.zeros, sessions, scale),
         rejected=extended if won.is_rejected else None,
         baseline_model=plain,
-        force_model=_with_offset(force.model, named.zeros, sessions, scale, undone) if has_own else None,
+        force_model=_with_offset(force.model, named.zeros, sessions, scale, force.undone) if has_own else None,
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, plain, extended, scale) for session in fine),
@@ -261,7 +259,7 @@ def _limits_of_the_force(
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
     undone = extended if force.is_plain else force.model
-    zero = _mean_offset(given.sessions, undone_of(force.model, given.fine[0]))
+    zero = _mean_offset(given.sessions, force.undone)
     of_causes = {one.member.name for one in named.names}
     return (
         *([worse_of(won, ways)] if won.is_rejected else []),

@@ -157,7 +157,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("own_zeros", None)
     answer("offsets", np.array([0.01, 0.03]))
     answer("as_calibrated", lambda *_: list(made.as_calibrated))
-    answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N))
+    answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N, model))
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
@@ -534,13 +534,31 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
 ) -> None:
     assert _run_diagnosis(parts).force_model is None
     parts.seen.clear()
-    by_plain = Compensation(MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), ("linear_leak", "delay"), is_plain=True)
+    by_plain = Compensation(
+        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), MODEL, ("linear_leak", "delay"), is_plain=True
+    )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     told = _run_diagnosis(parts)
     assert told.force_model == "with offset"
     assert parts.seen["_with_offset"][0][0] is MODEL  # the plain one's
     assert told.extended.force_rmse_n == 9.0
     assert any("so the calibration compensates by the baseline, and its twin" in limit for limit in told.limits)
+
+
+@pytest.mark.parametrize(("apart", "has_own"), [(0.9, False), (1.1, True), (-1.1, True)])
+def test_a_calibration_takes_the_zero_of_what_its_filter_undoes(
+    parts: Any, monkeypatch: pytest.MonkeyPatch, apart: float, has_own: bool
+) -> None:
+    """Of what it does not, as a zero that goes with the room, the mean is the zero's."""
+    undone = replace(MODEL, noise=0.5)
+    in_part = Compensation(MODEL, EXTENDED_N, PLAIN_N, EXTENDED_N, undone)
+    monkeypatch.setattr(_procedure, "compensation", lambda *_: in_part)
+    zero = 0.01 + apart * STANDARD.material
+    monkeypatch.setattr(_procedure, "_mean_offset", lambda _, model: zero if model is undone else 0.01)
+    told = _run_diagnosis(parts)
+    assert told.force_model == ("with offset" if has_own else None)
+    assert (parts.seen["_with_offset"][0][-1] is undone) == has_own
+    assert parts.seen["as_calibrated"][0][2] == zero
 
 
 def test_what_a_calibration_gives_of_the_same_recordings_is_said(parts: Any) -> None:
@@ -572,7 +590,9 @@ def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     assert model.names == parts.found.fit.model.names
     assert step_s == 0.05
     parts.seen.clear()
-    by_plain = Compensation(MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), ("linear_leak", "delay"), is_plain=True)
+    by_plain = Compensation(
+        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), MODEL, ("linear_leak", "delay"), is_plain=True
+    )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     (_, said, why) = _run_diagnosis(parts).limits
     assert "gives a worse force: on what was fitted it is off by 8.2 N, the baseline by 8 N" in said
