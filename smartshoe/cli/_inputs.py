@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 MISSING_SHARE = 0.05  # of a signal's samples, from which on it is reported
 BEYOND = 1.1  # of the largest load that a calibration has seen
+FASTER = 2.0  # than the fastest loading that it has seen
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -184,11 +185,19 @@ def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibrati
             )
 
 
-def warn_of_forces_beyond(label: str, force_n: Array, calibration: Calibration) -> None:
-    """A warning on stderr where the forces (n,) that a calibration gave pass the largest load that it has seen."""
+def warn_of_forces_beyond(label: str, time_s: Array, force_n: Array, calibration: Calibration) -> None:
+    """A warning on stderr where the forces (n,) that a calibration gave pass the loads, or the rates, it has seen."""
+    from smartshoe.signals.loading import rate_range
+
     seen, top_n = calibration.load_range_n, float(force_n.max(initial=0.0))
     if seen is not None and top_n > BEYOND * seen[1]:
         warn(
             f"{label} comes to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N: the rest is"
             " extrapolated, or the calibration is another unit's"
+        )
+    rates, fastest = calibration.rate_range_n_per_s, rate_range([(time_s, force_n)])[1]
+    if rates is not None and fastest > FASTER * rates[1] > 0.0:
+        warn(
+            f"{label} rises by {fastest:.0f} N/s, the calibration has seen {rates[1]:.0f} N/s: what the unit does at"
+            " such rates is extrapolated (calibrate with triangles as fast)"
         )

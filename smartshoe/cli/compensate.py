@@ -45,7 +45,7 @@ def command(
     for said in result.notes[len(recording.notes) :]:
         note(said)
     estimate_n = result["force_estimate"].si
-    warn_of_forces_beyond(result.label, estimate_n, calibration)
+    warn_of_forces_beyond(result.label, result.time_s, estimate_n, calibration)
     click.echo(
         f"{result.label}: {len(result)} samples, force {estimate_n.min():.1f} to {estimate_n.max():.1f} N,"
         f" mean {estimate_n.mean():.1f} N" + (f"; written to {out_path}" if out_path else "; --out keeps them")

@@ -550,6 +550,21 @@ def test_a_calibration_of_a_unit_that_gives_less_is_noticed_by_its_forces(
     assert "the calibration has seen" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("times", "is_warned"), [(1.5, False), (4.0, True)])
+def test_a_load_that_rises_faster_than_any_in_the_calibration_is_noticed(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], times: float, is_warned: bool
+) -> None:
+    """A walk beside slow triangles: what the unit does so quickly, nobody has seen."""
+    own, quick = tmp_path / "own.json", tmp_path / "quick.csv"
+    assert run_command(["identify", str(table), "--calibration", str(own)]) == 0
+    header, *rows = table.read_text().splitlines()
+    split = [row.split(",", 1) for row in rows]
+    quick.write_text("\n".join([header, *(f"{float(time_s) / times!r},{rest}" for time_s, rest in split)]))
+    capsys.readouterr()
+    assert run_command(["compensate", str(quick), "--calibration", str(own)]) == 0
+    assert ("what the unit does at such rates is extrapolated" in capsys.readouterr().err) == is_warned
+
+
 @pytest.mark.parametrize("command", ["identify", "gait"])
 def test_an_error_lists_ten_columns_at_most(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "wide.csv"
