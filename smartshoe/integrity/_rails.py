@@ -54,9 +54,9 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     starts, stops = runs_of(tied)
     size = stops - starts
     leaves_n = float(np.median(view.load.values[stops[size >= min(view.thresholds.few, size.max())] - 1]))
-    cut_off = "its zero is cut off" + (
-        "" if view.is_swapped else f", and loads below about {leaves_n:.2g} N are not seen"
-    )
+    cut_off = "its zero is cut off"
+    if leaves_n > 0.0 and not view.is_swapped:
+        cut_off += f", and loads below about {leaves_n:.2g} N are not seen"
     yield Finding(
         "low_rail",
         view.whole(on),
