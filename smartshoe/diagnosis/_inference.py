@@ -94,7 +94,8 @@ def infer(
     if (gained := with_likelier_gains(state, sessions)) is not None:
         progress("going through it again beside what recordings have of their own")
         beside = infer(start, gained, thresholds, progress)
-        return _beside_own(beside, plain, gained, foretells(beside.fit.model, plain.model, state, sessions, gained))
+        is_foretold = foretells(beside.fit.model, plain.model, state, sessions, gained)
+        return _beside_own(beside, plain, gained, is_foretold, thresholds)
     progress("weighing alternatives")
     found = _validated(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
@@ -119,12 +120,13 @@ def infer(
     return Inference(plain, found.fit, members, screening, likeness, refused, undone=found.undone, alone=alone)
 
 
-def _beside_own(beside: Inference, plain: Fit, gained: Sequence[Session], is_foretold: bool) -> Inference:
+def _beside_own(
+    beside: Inference, plain: Fit, gained: Sequence[Session], is_foretold: bool, thresholds: Thresholds
+) -> Inference:
     """What was found ``beside`` gains or zeros of the recordings' own, with these; no effect where none foretells."""
     if not (beside.own_gains or beside.zero_changes):
         about = gained, beside.fit.model
-        gains = gains_of(*about, beside.fit.likelihood.thresholds)
-        beside = replace(beside, own_gains=gains, zero_changes=zero_changes_of(*about))
+        beside = replace(beside, own_gains=gains_of(*about, thresholds), zero_changes=zero_changes_of(*about))
     if is_foretold:
         return replace(beside, baseline=plain)
     return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)

@@ -260,7 +260,7 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
         return gains[sessions]
 
     monkeypatch.setattr(_inference, "with_likelier_gains", likelier)
-    monkeypatch.setattr(_inference, "gains_of", lambda sessions, model: (sessions, model))
+    monkeypatch.setattr(_inference, "gains_of", lambda sessions, model, thresholds: (sessions, model))
     monkeypatch.setattr(_inference, "zero_changes_of", lambda sessions, model: ())
     flow.members = (_Sure(0.9),)
     stands = [True, True, True]  # of each that is told, from the innermost on
