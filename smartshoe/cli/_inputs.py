@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 MISSING_SHARE = 0.05  # of a signal's samples, from which on it is reported
 BEYOND = 1.1  # of the largest load that a calibration has seen
 FASTER = 2.0  # than the fastest loading that it has seen
+OFF_SHARE, OFF_TIMES = 0.05, 2.0  # of the largest load, and times what the fit left: more is worth a warning
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -200,4 +201,28 @@ def warn_of_forces_beyond(label: str, time_s: Array, force_n: Array, calibration
         warn(
             f"{label} rises by {fastest:.0f} N/s, the calibration has seen {rates[1]:.0f} N/s: what the unit does at"
             " such rates is extrapolated (calibrate with triangles as fast)"
+        )
+
+
+def warn_of_use_from_rest(recordings: Sequence[Recording], calibration: Calibration, told_n: float) -> None:
+    """A warning on stderr where a calibration is far off on the very recordings that it was fitted to.
+
+    It begins each in a steady state and takes one zero for all, which a fit does not: where a unit leaks or drifts, a
+    zero far off and a past that takes it back may fit best. ``told_n``: rms error in N by the fit, NaN where unknown.
+    """
+    import numpy as np
+
+    from smartshoe.calibration import compensated
+
+    off_n = [
+        float(np.sqrt(np.mean((compensated(one, calibration)["force_estimate"].si - one.force_n) ** 2)))
+        for one in recordings
+    ]
+    worst = max(range(len(recordings)), key=off_n.__getitem__)
+    least_n = OFF_SHARE * float(np.max(np.abs(recordings[worst].force_n)))
+    if off_n[worst] > max(least_n, 0.0 if np.isnan(told_n) else OFF_TIMES * told_n):
+        warn(
+            f"from rest and with one zero, as it is used, the calibration is off by {off_n[worst]:.0f} N (rms) on"
+            f" {recordings[worst].label}: the unit does what no standard linear solid does, such as a leak or a drift"
+            " (smartshoe diagnose says what, and makes a calibration of it)"
         )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from smartshoe.cli._inputs import column_options, read_all
+from smartshoe.cli._inputs import column_options, read_all, warn_of_use_from_rest
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
@@ -113,7 +114,9 @@ def command(
         import datetime
 
         today = datetime.datetime.now(datetime.UTC).date().isoformat()
-        found.calibration(created=today).save(calibration_path)
+        calibration = found.calibration(created=today)
+        calibration.save(calibration_path)
+        warn_of_use_from_rest(recordings, calibration, found.rmse if found.direction == "inverse" else math.nan)
     if not emit_json(result, json_path):
         print_identification(result)
         if calibration_path is not None:
