@@ -13,13 +13,9 @@ from smartshoe.cli._output import warn
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
 
 if TYPE_CHECKING:
-    from smartshoe.arrays import Array
-    from smartshoe.calibration import Calibration
+    pass
 
 MISSING_SHARE = 0.05  # of a signal's samples, from which on it is reported
-BEYOND = 1.1  # of the largest load that a calibration has seen
-FASTER = 2.0  # than the fastest loading that it has seen
-OFF_SHARE, OFF_TIMES = 0.05, 2.0  # of the largest load, and times what the fit left: more is worth a warning
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -152,77 +148,3 @@ def _channel_of(recording: Recording, column: str, unit: str) -> Channel:
             " leave the unit out"
         )
     return replace(channel, unit=said)
-
-
-def warn_of_a_past(recordings: Sequence[Recording], calibration: Calibration) -> None:
-    """A warning on stderr for each recording that carries on from another, where the calibration has effects."""
-    for recording in recordings:
-        earlier = recording.metadata.get("continues")
-        if earlier is not None and calibration.extended is not None:
-            warn(
-                f"{recording.label} continues {earlier}: the filter begins as after a rest, without what"
-                " drift, set, softening and leak had done by then (join the two files to carry it over)"
-            )
-
-
-def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:
-    """A warning on stderr for each recording that says it is of another unit, or whose load passes what was seen."""
-    for recording in recordings:
-        if recording.unit and calibration.unit and recording.unit != calibration.unit:
-            warn(
-                f"{recording.label} is of unit {recording.unit}, the calibration of {calibration.unit}: its"
-                " forces mean nothing; give that unit's own calibration"
-            )
-    seen = calibration.load_range_n
-    for recording in recordings:
-        loads = recording.of_role("load")
-        if seen is None or not loads:
-            continue
-        top_n = float(loads[0].si.max())
-        if top_n > BEYOND * seen[1]:
-            warn(
-                f"{recording.label} is loaded to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N:"
-                " the rest is extrapolated"
-            )
-
-
-def warn_of_forces_beyond(label: str, time_s: Array, force_n: Array, calibration: Calibration) -> None:
-    """A warning on stderr where the forces (n,) that a calibration gave pass the loads, or the rates, it has seen."""
-    from smartshoe.signals.loading import rate_range
-
-    seen, top_n = calibration.load_range_n, float(force_n.max(initial=0.0))
-    if seen is not None and top_n > BEYOND * seen[1]:
-        warn(
-            f"{label} comes to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N: the rest is"
-            " extrapolated, or the calibration is another unit's"
-        )
-    rates, fastest = calibration.rate_range_n_per_s, rate_range([(time_s, force_n)])[1]
-    if rates is not None and fastest > FASTER * rates[1] > 0.0:
-        warn(
-            f"{label} rises by {fastest:.0f} N/s, the calibration has seen {rates[1]:.0f} N/s: what the unit does at"
-            " such rates is extrapolated (calibrate with triangles as fast)"
-        )
-
-
-def warn_of_use_from_rest(recordings: Sequence[Recording], calibration: Calibration, told_n: float) -> None:
-    """A warning on stderr where a calibration is far off on the very recordings that it was fitted to.
-
-    It begins each in a steady state and takes one zero for all, which a fit does not: where a unit leaks or drifts, a
-    zero far off and a past that takes it back may fit best. ``told_n``: rms error in N by the fit, NaN where unknown.
-    """
-    import numpy as np
-
-    from smartshoe.calibration import compensated
-
-    off_n = [
-        float(np.sqrt(np.mean((compensated(one, calibration)["force_estimate"].si - one.force_n) ** 2)))
-        for one in recordings
-    ]
-    worst = max(range(len(recordings)), key=off_n.__getitem__)
-    least_n = OFF_SHARE * float(np.max(np.abs(recordings[worst].force_n)))
-    if off_n[worst] > max(least_n, 0.0 if np.isnan(told_n) else OFF_TIMES * told_n):
-        warn(
-            f"from rest and with one zero, as it is used, the calibration is off by {off_n[worst]:.0f} N (rms) on"
-            f" {recordings[worst].label}: the unit does what no standard linear solid does, such as a leak or a drift"
-            " (smartshoe diagnose says what, and makes a calibration of it)"
-        )

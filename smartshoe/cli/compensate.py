@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli._inputs import column_options, read_all, warn_of_a_past, warn_of_another_unit, warn_of_forces_beyond
+from smartshoe.cli._cautions import warn_of_a_past, warn_of_another_unit, warn_of_forces_beyond
+from smartshoe.cli._inputs import column_options, read_all
 
 
 @click.command(

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from smartshoe.cli._inputs import column_options, read_all, warn_of_use_from_rest
+from smartshoe.cli._cautions import warn_of_use_from_rest
+from smartshoe.cli._inputs import column_options, read_all
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
