@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, Index, Mask, numbers_of
 from smartshoe.display import Summarised, SummaryTable, first_names, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
-from smartshoe.stamps import GAP, rounded_grid_step_s, usual_step_s
+from smartshoe.stamps import mean_step_s, rounded_grid_step_s, usual_step_s
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
 
 if TYPE_CHECKING:
@@ -390,10 +390,10 @@ def sample_rate_of(time_s: Array) -> float:
     """Samples a second while none is missing, in Hz, of time stamps (n,), two at least.
 
     By the grid that they were rounded from, where they were: to milliseconds those of 90 Hz are 11 ms apart more often
-    than not. Else by the mean step; steps that are nearly two of the median's, or more, are gaps.
+    than not. Else by the mean step but for gaps.
     """
-    step_s, steps = rounded_grid_step_s(time_s), np.diff(time_s)
-    return 1.0 / (float(np.mean(steps[steps < GAP * np.median(steps)])) if step_s is None else step_s)
+    step_s = rounded_grid_step_s(time_s)
+    return 1.0 / (mean_step_s(time_s) if step_s is None else step_s)
 
 
 __all__ = [

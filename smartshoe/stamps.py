@@ -6,7 +6,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 
-GAP = 1.75  # usual steps: where two stamps lie further apart a sample is missing
+_GAP = 1.75  # usual steps: where two stamps lie further apart a sample is missing
 _MOST_DIGITS = 12  # stamps with more were not rounded
 _PASSES = 3  # each with a better step, which numbers longer gaps
 _HALF = 0.6  # of what the last digit counts: what rounding moves a stamp by, and the slope's own error
@@ -20,6 +20,12 @@ def usual_step_s(time_s: Array) -> float:
     """
     step_s = rounded_grid_step_s(time_s)
     return float(np.median(np.diff(time_s))) if step_s is None else step_s
+
+
+def mean_step_s(time_s: Array) -> float:
+    """The mean step in s of stamps (n,), two at least, but for gaps: nearly two of the median's steps, or more."""
+    steps = np.diff(time_s)
+    return float(np.mean(steps[steps < _GAP * np.median(steps)]))
 
 
 def rounded_grid_step_s(time_s: Array) -> float | None:
@@ -36,7 +42,7 @@ def rounded_grid_step_s(time_s: Array) -> float | None:
     if abs(span - median * steps.size) <= _SAME * span:
         return None
     rounding = _rounding_s(time_s)
-    step = float(np.mean(steps[steps < GAP * median]))
+    step = mean_step_s(time_s)
     for _ in range(_PASSES):
         numbers = np.rint(steps / step)
         parted = (numbers > 1.0) & (np.abs(steps - numbers * step) > 2.0 * rounding)
@@ -78,4 +84,4 @@ def _rounding_s(time_s: Array) -> float:
     return max(last(np.ones(1), 1.0), last(first, float(first.max())))
 
 
-__all__ = ["GAP", "rounded_grid_step_s", "usual_step_s"]
+__all__ = ["mean_step_s", "rounded_grid_step_s", "usual_step_s"]

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
 from smartshoe.cli._output import warn
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
-
-if TYPE_CHECKING:
-    pass
 
 MISSING_SHARE = 0.05  # of a signal's samples, from which on it is reported
 

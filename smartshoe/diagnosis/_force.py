@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,19 +37,24 @@ class Compensation:
     """What a unit is compensated by: ``model``, run backwards, with its ``error``.
 
     ``model`` is the extended one, but for effects (``passed_over``) whose undoing does more harm than good, or the
-    plain one; ``undone`` is what of it a filter of readings undoes. ``before`` is the plain one's error, ``whole`` that
-    of the extended one with all its effects. ``rejected``: the error of the one that would be ``model``, where it is
-    worse on what is held out.
+    plain one; ``filter`` undoes it, at the recordings' rate. ``before`` is the plain one's error, ``whole`` that of the
+    extended one with all its effects. ``rejected``: the error of the one that would be ``model``, where it is worse on
+    what is held out.
     """
 
     model: ExtendedModel
     error: ForceError
     before: ForceError
     whole: ForceError
-    undone: ExtendedModel
+    filter: ExtendedCompensator
     passed_over: tuple[str, ...] = ()
     is_plain: bool = False
     rejected: ForceError | None = None
+
+    @cached_property
+    def undone(self) -> ExtendedModel:
+        """What of ``model`` a filter of readings undoes."""
+        return _without(self.model, self.filter.not_inverted)
 
 
 def compensation(
@@ -65,8 +71,8 @@ def compensation(
     before, whole = force_error(fine, plain), force_error(fine, extended)
 
     def by_plain(rejected: ForceError | None = None) -> Compensation:
-        undone = undone_of(plain, fine[0])
-        return Compensation(plain, before, before, whole, undone, extended.names, is_plain=True, rejected=rejected)
+        filter_ = _compensator(plain, fine[0])
+        return Compensation(plain, before, before, whole, filter_, extended.names, is_plain=True, rejected=rejected)
 
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
@@ -85,7 +91,7 @@ def compensation(
     if error.held_out_n > (1.0 + thresholds.standing) * before.held_out_n:
         return by_plain(error)
     passed_over = tuple(name for name in extended.names if name not in model.names)
-    return Compensation(model, error, before, whole, undone_of(model, fine[0]), passed_over)
+    return Compensation(model, error, before, whole, _compensator(model, fine[0]), passed_over)
 
 
 def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Session:
@@ -128,14 +134,11 @@ def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
     return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
-def going_on_of(
-    model: ExtendedModel, fine: Sequence[Session], named: Collection[str], thresholds: Thresholds
-) -> list[str]:
+def going_on_of(found: Compensation, named: Collection[str], thresholds: Thresholds) -> list[str]:
     """What is said of effects that are not ``named`` and that a calibration takes off by the clock, on and on."""
-    moved = _compensator(model, fine[0]).moved_in_an_hour
     said = [
         f"{in_words(name)} by {100.0 * share:+.2g} %"
-        for name, share in moved.items()
+        for name, share in found.filter.moved_in_an_hour.items()
         if name not in named and abs(share) > thresholds.standing
     ]
     if not said:
@@ -173,11 +176,6 @@ def _off_n(session: Session, model: ExtendedModel) -> Array:
     undone = _without(model, compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
     _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
     return _off_by_n(session, model, compensator, own)
-
-
-def undone_of(model: ExtendedModel, session: Session) -> ExtendedModel:
-    """What of a model a compensator at the rate of a session undoes."""
-    return _without(model, _compensator(model, session).not_inverted)
 
 
 def _without(model: ExtendedModel, names: Iterable[str]) -> ExtendedModel:

@@ -161,9 +161,8 @@ def _other_laws(
         is_bent = is_beyond_memory(fitted.model, likelihood.thresholds) and not is_stretched(extended.model)
         if is_bent and is_stretched(fit(likelihood, fitted.model).model):
             # An arm as no wall has follows what the law does not: it is weighed beside the arm that was found.
-            beside = replace(extended.model, parts=tuple(p for p in extended.model.parts if p.name in less.model.names))
-            own = fitted.model.part(law.name)
-            fitted = fit(likelihood, beside.with_part(own.effect, own.values), FEW_STEPS, only=law.name)
+            beside = _without(one.name, extended.model).with_part(law, fitted.model.part(law.name).values)
+            fitted = fit(likelihood, beside, FEW_STEPS, only=law.name)
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))

@@ -266,7 +266,7 @@ def _limits_of_the_force(
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
         *force_of(force),
         *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
-        *([] if force.is_plain else going_on_of(force.model, given.fine, of_causes, thresholds)),
+        *([] if force.is_plain else going_on_of(force, of_causes, thresholds)),
         *named.of_zeros,
         *own_gains_of(found.own_gains),
         *own_zeros_of(apart, given.scale),

@@ -29,6 +29,7 @@ SCREENED = ("delay", "flexible_lag", "linear_leak", "dead_band", "rate_gain", "w
 SCREENING = tuple((name, float(k)) for k, name in enumerate(SCREENED))
 FINE: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.05))
 PLAIN_N, EXTENDED_N = ForceError(8.0, 9.0), ForceError(6.0, 7.0)
+FILTER: Any = SimpleNamespace(not_inverted=(), moved_in_an_hour={})  # undoes all
 
 
 def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
@@ -157,7 +158,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("own_zeros", None)
     answer("offsets", np.array([0.01, 0.03]))
     answer("as_calibrated", lambda *_: list(made.as_calibrated))
-    answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N, model))
+    answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N, FILTER))
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
@@ -535,7 +536,7 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
     assert _run_diagnosis(parts).force_model is None
     parts.seen.clear()
     by_plain = Compensation(
-        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), MODEL, ("linear_leak", "delay"), is_plain=True
+        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), FILTER, ("linear_leak", "delay"), is_plain=True
     )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     told = _run_diagnosis(parts)
@@ -550,8 +551,10 @@ def test_a_calibration_takes_the_zero_of_what_its_filter_undoes(
     parts: Any, monkeypatch: pytest.MonkeyPatch, apart: float, has_own: bool
 ) -> None:
     """Of what it does not, as a zero that goes with the room, the mean is the zero's."""
-    undone = replace(MODEL, noise=0.5)
-    in_part = Compensation(MODEL, EXTENDED_N, PLAIN_N, EXTENDED_N, undone)
+    late: Any = SimpleNamespace(not_inverted=("delay",), moved_in_an_hour={})
+    in_part = Compensation(MODEL.with_part("delay"), EXTENDED_N, PLAIN_N, EXTENDED_N, late)
+    undone = in_part.undone
+    assert undone.names == MODEL.names
     monkeypatch.setattr(_procedure, "compensation", lambda *_: in_part)
     zero = 0.01 + apart * STANDARD.material
     monkeypatch.setattr(_procedure, "_mean_offset", lambda _, model: zero if model is undone else 0.01)
@@ -591,7 +594,7 @@ def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     assert step_s == 0.05
     parts.seen.clear()
     by_plain = Compensation(
-        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), MODEL, ("linear_leak", "delay"), is_plain=True
+        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), FILTER, ("linear_leak", "delay"), is_plain=True
     )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     (_, said, why) = _run_diagnosis(parts).limits

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
+from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis import Thresholds, _force
 from smartshoe.diagnosis._force import (
+    Compensation,
     ForceError,
     as_calibrated,
     compensation,
@@ -22,7 +24,6 @@ from smartshoe.diagnosis._force import (
     force_of,
     going_on_of,
     not_undone_of,
-    undone_of,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
@@ -37,6 +38,7 @@ from smartshoe.diagnosis._validation import extrapolating
 from smartshoe.diagnosis._zero import offsets, own_zeros
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
@@ -250,17 +252,26 @@ def test_what_has_no_name_and_is_taken_off_by_the_clock_is_said_to_go_on(one: Se
     """0.00002 of full scale a second is 7.2 % in an hour, through the gain that follows it."""
     drift = np.array([2e-5, 0.0, 0.0, 1.0])
     drifting = MODEL.with_part("zero_drift", drift)
-    (said,) = going_on_of(drifting, [one], (), STANDARD)
+
+    def told(model: ExtendedModel, *named: str) -> list[str]:
+        nothing = ForceError(0.0, 0.0)
+        undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
+        return going_on_of(Compensation(model, nothing, nothing, nothing, undone_by), named, STANDARD)
+
+    (said,) = told(drifting)
     assert "(zero drift by -7.2 %)" in said
-    assert going_on_of(drifting, [one], ("zero_drift",), STANDARD) == []  # a cause is told as one
-    assert going_on_of(MODEL.with_part("zero_drift", 0.2 * drift), [one], (), STANDARD) == []  # hardly anything
-    assert going_on_of(MODEL, [one], (), STANDARD) == []
+    assert told(drifting, "zero_drift") == []  # a cause is told as one
+    assert told(MODEL.with_part("zero_drift", 0.2 * drift)) == []  # hardly anything
+    assert told(MODEL) == []
 
 
 def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
-    assert undone_of(late, one).names == ("dead_band",)
-    assert undone_of(MODEL, one) is MODEL
+    nothing = ForceError(0.0, 0.0)
+    for model, names in ((late, ("dead_band",)), (MODEL, ())):
+        found = Compensation(model, nothing, nothing, nothing, ExtendedCompensator(model, 1.0 / one.conditions.step_s))
+        assert found.undone.names == names
+    assert found.undone is MODEL
 
 
 def test_an_effect_that_is_far_larger_in_what_was_not_fitted_is_beyond_knowledge(one: Session) -> None:

@@ -66,9 +66,8 @@ def _lines(found: list[int]) -> str:
 
 
 class _NumberTable:
-    def __init__(self, path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> None:
-        self.path, self.names, self.lines = path, names, lines
-        self.cells: list[Sequence[str]] = list(zip(*rows, strict=True))
+    def __init__(self, path: Path, names: Sequence[str], cells: Sequence[Sequence[str]], lines: Sequence[int]) -> None:
+        self.path, self.names, self.lines, self.cells = path, names, lines, cells
         self.joined = ["\n".join(column) for column in self.cells]
 
     def first(self, wanted: re.Pattern[str], limit: int = 3) -> list[int]:
@@ -213,10 +212,20 @@ def without_units(
 def numbers_of(path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> Numbers:
     """The cells ``rows`` (n rows of one cell per name), which stand on ``lines`` (n,), as columns of numbers.
 
+    Raises as `numbers_of_columns` does.
+    """
+    return numbers_of_columns(path, names, list(zip(*rows, strict=True)), lines)
+
+
+def numbers_of_columns(
+    path: Path, names: Sequence[str], cells: Sequence[Sequence[str]], lines: Sequence[int]
+) -> Numbers:
+    """The cells of columns, (n,) each and one a name, which stand on ``lines`` (n,), as numbers.
+
     One decimal mark holds for the whole file. Raises `FormatError` naming the lines where cells contradict each
     other, and the line and column of a cell that is no number.
     """
-    table = _NumberTable(path, names, rows, lines)
+    table = _NumberTable(path, names, cells, lines)
     decimal = table.decimal()
     notes: list[str] = []
     columns = [table.convert(index, decimal, notes) for index in range(len(names))]

@@ -345,21 +345,29 @@ def _others(cause: Cause) -> list[Rival]:
     return [rival for rival in cause.rivals if rival.effect not in cause.equivalents]
 
 
+def nearest_told(cause: Cause) -> Rival | None:
+    """The rival of which `why_this_one` says how likely it is: beside equivalents only one that may be likelier."""
+    nearest = next(iter(_others(cause)), None)
+    return None if nearest is None or (cause.equivalents and not nearest.may_be_likelier) else nearest
+
+
 def why_this_one(cause: Cause) -> str:
     """One sentence on how far the name can be trusted against its neighbours."""
-    others = _others(cause)
-    alone = [f"{in_words(one.effect)} alone in its place {one.says}" for one in others[:1] if one.may_be_likelier]
-    if cause.equivalents:
-        names = listed(cause.equivalents, "and")
-        among = f"{names} cannot be ruled out, since no equation is exact: take the name as one"
-        return "; ".join([f"{among} of {len(cause.equivalents) + 1}", *alone])
-    if alone:
-        return alone[0]
-    if others:
-        nearest = others[0]
+    nearest = nearest_told(cause)
+    if nearest is None:
+        told = "no other effect of the catalogue comes near"
+    elif nearest.may_be_likelier:
+        told = f"{in_words(nearest.effect)} alone in its place {nearest.says}"
+    else:
         near = in_words(nearest.effect)
-        return f"no other effect of the catalogue does as well; the nearest, {near}, {nearest.says}"
-    return "no other effect of the catalogue comes near"
+        told = f"no other effect of the catalogue does as well; the nearest, {near}, {nearest.says}"
+    if not cause.equivalents:
+        return told
+    among = (
+        f"{listed(cause.equivalents, 'and')} cannot be ruled out, since no equation is exact: take the name as one of"
+        f" {len(cause.equivalents) + 1}"
+    )
+    return among if nearest is None else f"{among}; {told}"
 
 
 @dataclass(frozen=True, slots=True)

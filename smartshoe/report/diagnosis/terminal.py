@@ -22,6 +22,7 @@ from smartshoe.report.diagnosis._sentences import (
     how_much,
     is_free_form,
     meanings,
+    nearest_told,
     not_in_the_model,
     parameter_text,
     shares_text,
@@ -119,7 +120,7 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
         for text in (_parameters(cause), not_in_the_model(cause)):
             if text:
                 _line(console, f"  {text}")
-    if any(rival.says in why_this_one(cause) for cause in diagnosis.causes for rival in cause.rivals):
+    if any(nearest_told(cause) for cause in diagnosis.causes):
         _line(console, LIKELIHOOD)
 
 

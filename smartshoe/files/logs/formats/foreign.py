@@ -12,7 +12,7 @@ import numpy as np
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
 from smartshoe.files.logs._moments import is_moment, seconds_of
-from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of, split_unit, without_units
+from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of_columns, split_unit, without_units
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import bracketed, even_rows, is_text, read_lines, split_cells
 from smartshoe.recording import split_column
@@ -165,7 +165,7 @@ def read(path: Path) -> Sheet:
             cells.append(column)
         else:
             notes.append(f"Column {names[index]} holds text and was left out.")
-    table = numbers_of(path, [names[index] for index in used], list(zip(*cells, strict=True)), numbers)
+    table = numbers_of_columns(path, [names[index] for index in used], cells, numbers)
     read_ = dict(zip(used, table.columns, strict=True))
     columns = [
         clocks.get(index) or Column(names[index], units[index], read_[index], label=labels[index])
