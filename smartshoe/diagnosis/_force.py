@@ -13,6 +13,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.diagnosis._zero import mean_offset
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import in_words, listed
 from smartshoe.models.extended import ExtendedModel
@@ -39,9 +40,10 @@ class Compensation:
     ``model`` is the extended one, but for effects (``passed_over``) whose undoing does more harm than good, or the
     plain one; ``filter`` undoes it, at the recordings' rate. ``before`` is the plain one's error, ``whole`` that of the
     extended one with all its effects. ``rejected``: the error of the one that would be ``model``, where it is worse on
-    what is held out.
+    what is held out. All errors are of the recordings ``fine``, which lack the share ``clipped`` of their samples.
     """
 
+    fine: Sequence[Session]
     model: ExtendedModel
     error: ForceError
     before: ForceError
@@ -50,11 +52,17 @@ class Compensation:
     passed_over: tuple[str, ...] = ()
     is_plain: bool = False
     rejected: ForceError | None = None
+    clipped: float = 0.0
 
     @cached_property
     def undone(self) -> ExtendedModel:
         """What of ``model`` a filter of readings undoes."""
         return _without(self.model, self.filter.not_inverted)
+
+    @cached_property
+    def zero(self) -> float:
+        """The recordings' mean offset beside what is undone, a share of full scale."""
+        return mean_offset(self.fine, self.undone)
 
 
 def compensation(
@@ -67,12 +75,15 @@ def compensation(
     without. Where the plain model's is nearer all the same, it is the one, and where it is on what is held out. No
     force is asked of samples that are clipped.
     """
+    count = sum(int(one.usable.sum()) for one in fine)
     fine = [_without_clipped(one, extended, thresholds) for one in fine]
+    clipped = 1.0 - sum(int(one.usable.sum()) for one in fine) / max(count, 1)
     before, whole = force_error(fine, plain), force_error(fine, extended)
 
     def by_plain(rejected: ForceError | None = None) -> Compensation:
         filter_ = _compensator(plain, fine[0])
-        return Compensation(plain, before, before, whole, filter_, extended.names, is_plain=True, rejected=rejected)
+        errors = before, before, whole
+        return Compensation(fine, plain, *errors, filter_, extended.names, True, rejected, clipped)
 
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
@@ -91,7 +102,7 @@ def compensation(
     if error.held_out_n > (1.0 + thresholds.standing) * before.held_out_n:
         return by_plain(error)
     passed_over = tuple(name for name in extended.names if name not in model.names)
-    return Compensation(model, error, before, whole, _compensator(model, fine[0]), passed_over)
+    return Compensation(fine, model, error, before, whole, _compensator(model, fine[0]), passed_over, clipped=clipped)
 
 
 def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Session:
@@ -102,6 +113,15 @@ def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresho
             lost = whole - model.without(part.name).simulate(session.conditions)
             usable = usable & (np.abs(lost) < thresholds.tolerable)
     return replace(session, usable=usable)
+
+
+def clipped_of(found: Compensation) -> list[str]:
+    """What is said of samples of which no force is asked."""
+    if not found.clipped:
+        return []
+    return [
+        f"errors of the force leave out {100.0 * found.clipped:.2g} % of samples, which are clipped and tell no load"
+    ]
 
 
 def force_of(found: Compensation) -> list[str]:
@@ -150,14 +170,13 @@ def going_on_of(found: Compensation, named: Collection[str], thresholds: Thresho
     ]
 
 
-def as_calibrated(fine: Sequence[Session], model: ExtendedModel, zero: float, thresholds: Thresholds) -> list[str]:
+def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
     """What is said where a calibration is clearly farther off than errors without a recording's own tell.
 
-    It takes one ``zero`` (share of full scale) for all recordings, that of what it undoes, and begins each as a unit
-    that bore nothing before.
+    It takes one zero for all recordings, that of what it undoes, and begins each as a unit that bore nothing before.
     """
-    there = [one for one in fine if one.usable.any()]
-    off_n = [_rms([_off_by_n(one, model, _compensator(model, one), zero)], [one.usable]) for one in there]
+    model, there = found.model, [one for one in found.fine if one.usable.any()]
+    off_n = [_rms([_off_by_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there]
     worst = max(range(len(there)), key=off_n.__getitem__)
     worst_n, name = off_n[worst], there[worst].recording.name
     told_n = _rms([_off_n(there[worst], model)], [there[worst].usable])

@@ -13,6 +13,7 @@ from smartshoe.diagnosis._causes import cause_of, zero_cause_of
 from smartshoe.diagnosis._force import (
     Compensation,
     as_calibrated,
+    clipped_of,
     compensation,
     force_of,
     going_on_of,
@@ -57,7 +58,7 @@ from smartshoe.diagnosis._verdict import (
     verdict_of,
 )
 from smartshoe.diagnosis._withheld import Chosen, causes_among
-from smartshoe.diagnosis._zero import OwnZeros, Zero, offsets, own_zeros, zeros_of
+from smartshoe.diagnosis._zero import OwnZeros, Zero, mean_offset, own_zeros, zeros_of
 from smartshoe.integrity import DataFault, Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
@@ -107,7 +108,7 @@ def diagnosed(
     parameters, covariance = joint_parameters(adopted.fit, scale)
     force = compensation(fine, adopted.model, plain, thresholds)
     # What no compensator takes off, be it the room's warmth, is its zero's, on the mean of the recordings.
-    zeros_apart = abs(_mean_offset(sessions, force.undone) - _mean_offset(sessions, force.model))
+    zeros_apart = abs(force.zero - mean_offset(force.fine, force.model))
     has_own = bool(force.passed_over) or zeros_apart >= thresholds.material
     of_force = _limits_of_the_force(found, given, named, extended, force, outcome, left, apart)
     says = sentence_of(
@@ -146,7 +147,7 @@ def diagnosed(
         model=_with_offset(adopted.model, named.zeros, sessions, scale),
         rejected=extended if won.is_rejected else None,
         baseline_model=plain,
-        force_model=_with_offset(force.model, named.zeros, sessions, scale, force.undone) if has_own else None,
+        force_model=_with_offset(force.model, named.zeros, force.fine, scale, force.undone) if has_own else None,
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, plain, extended, scale) for session in fine),
@@ -259,18 +260,18 @@ def _limits_of_the_force(
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
     undone = extended if force.is_plain else force.model
-    zero = _mean_offset(given.sessions, force.undone)
     of_causes = {one.member.name for one in named.names}
     return (
         *([worse_of(won, ways)] if won.is_rejected else []),
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
         *force_of(force),
+        *clipped_of(force),
         *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
         *([] if force.is_plain else going_on_of(force, of_causes, thresholds)),
         *named.of_zeros,
         *own_gains_of(found.own_gains),
         *own_zeros_of(apart, given.scale),
-        *as_calibrated(given.fine, force.model, zero, thresholds),
+        *as_calibrated(force, thresholds),
         *zero_changes_said(found.zero_changes),
     )
 
@@ -330,15 +331,10 @@ def _with_offset(
     of = undone or model
     for tare in tares:
         model, of = model.with_part(*tare), of.with_part(*tare)
-    offset = _mean_offset(sessions, of) + scale.zero / scale.reading
+    offset = mean_offset(sessions, of) + scale.zero / scale.reading
     if offset == 0.0:
         return model
     return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the chain's end multiplies it
-
-
-def _mean_offset(sessions: Sequence[Session], model: ExtendedModel) -> float:
-    """The recordings' mean offset under ``model``, a share of full scale."""
-    return float(np.mean(offsets(sessions, model)))
 
 
 def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:

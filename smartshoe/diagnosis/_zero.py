@@ -50,6 +50,11 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
     )
 
 
+def mean_offset(sessions: Sequence[Session], model: ExtendedModel) -> float:
+    """The fitted recordings' mean offset under ``model``, a share of full scale."""
+    return float(np.mean(offsets(sessions, model)))
+
+
 @dataclass(frozen=True)
 class OwnZeros:
     """Offsets (shares of full scale) of the recordings by their ``names``, which differ."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, TIME_S, _left
 
 from smartshoe import Recording
-from smartshoe.diagnosis import _procedure, _withheld
+from smartshoe.diagnosis import _force, _procedure, _withheld
 from smartshoe.diagnosis._force import Compensation, ForceError
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._held_out import Errors
@@ -156,9 +156,10 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("wall_ratio_of", lambda *_: made.wall_ratio)
     answer("not_undone_of", lambda *_: list(made.not_undone))
     answer("own_zeros", None)
-    answer("offsets", np.array([0.01, 0.03]))
+    answer("mean_offset", 0.02)
+    monkeypatch.setattr(_force, "mean_offset", lambda *_: 0.02)
     answer("as_calibrated", lambda *_: list(made.as_calibrated))
-    answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N, FILTER))
+    answer("compensation", lambda fine, model, *_: Compensation(fine, model, EXTENDED_N, PLAIN_N, EXTENDED_N, FILTER))
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
@@ -536,7 +537,7 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
     assert _run_diagnosis(parts).force_model is None
     parts.seen.clear()
     by_plain = Compensation(
-        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), FILTER, ("linear_leak", "delay"), is_plain=True
+        [FINE], MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), FILTER, ("linear_leak", "delay"), is_plain=True
     )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     told = _run_diagnosis(parts)
@@ -552,25 +553,25 @@ def test_a_calibration_takes_the_zero_of_what_its_filter_undoes(
 ) -> None:
     """Of what it does not, as a zero that goes with the room, the mean is the zero's."""
     late: Any = SimpleNamespace(not_inverted=("delay",), moved_in_an_hour={})
-    in_part = Compensation(MODEL.with_part("delay"), EXTENDED_N, PLAIN_N, EXTENDED_N, late)
+    in_part = Compensation([FINE], MODEL.with_part("delay"), EXTENDED_N, PLAIN_N, EXTENDED_N, late)
     undone = in_part.undone
     assert undone.names == MODEL.names
     monkeypatch.setattr(_procedure, "compensation", lambda *_: in_part)
     zero = 0.01 + apart * STANDARD.material
-    monkeypatch.setattr(_procedure, "_mean_offset", lambda _, model: zero if model is undone else 0.01)
+    for room in (_procedure, _force):
+        monkeypatch.setattr(room, "mean_offset", lambda _, model: zero if model is undone else 0.01)
     told = _run_diagnosis(parts)
     assert told.force_model == ("with offset" if has_own else None)
     assert (parts.seen["_with_offset"][0][-1] is undone) == has_own
-    assert parts.seen["as_calibrated"][0][2] == zero
+    assert parts.seen["as_calibrated"][0][0].zero == zero
 
 
 def test_what_a_calibration_gives_of_the_same_recordings_is_said(parts: Any) -> None:
     parts.as_calibrated = ["by one zero"]
     assert _run_diagnosis(parts).limits == ("limit", "by one zero")
-    (fine, model, zero, thresholds), _ = parts.seen["as_calibrated"]
-    assert (fine, thresholds) == ([FINE], STANDARD)
-    assert zero == pytest.approx(0.02)
-    assert model.names == parts.found.fit.model.names
+    (force, thresholds), _ = parts.seen["as_calibrated"]
+    assert (force.fine, thresholds) == ([FINE], STANDARD)
+    assert force.model.names == parts.found.fit.model.names
 
 
 def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
@@ -594,7 +595,7 @@ def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     assert step_s == 0.05
     parts.seen.clear()
     by_plain = Compensation(
-        MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), FILTER, ("linear_leak", "delay"), is_plain=True
+        [FINE], MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), FILTER, ("linear_leak", "delay"), is_plain=True
     )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     (_, said, why) = _run_diagnosis(parts).limits

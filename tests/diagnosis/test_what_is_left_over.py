@@ -19,6 +19,7 @@ from smartshoe.diagnosis._force import (
     Compensation,
     ForceError,
     as_calibrated,
+    clipped_of,
     compensation,
     force_error,
     force_of,
@@ -35,7 +36,7 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_no
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate
 from smartshoe.diagnosis._validation import extrapolating
-from smartshoe.diagnosis._zero import offsets, own_zeros
+from smartshoe.diagnosis._zero import mean_offset, own_zeros
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
@@ -226,6 +227,13 @@ def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
     assert not found.is_plain
     assert found.error.fitted_n < 0.1 * found.before.fitted_n
     assert force_error([seen], clipped).fitted_n > 10.0 * found.error.fitted_n  # with the clipped ones
+    (said,) = clipped_of(found)
+    lost_share = np.mean(np.abs(MODEL.simulate(one.conditions) - seen.reading) >= STANDARD.tolerable)
+    assert said.startswith(f"errors of the force leave out {100.0 * lost_share:.2g} % of samples")
+    assert clipped_of(compensation([one], MODEL, MODEL, STANDARD)) == []
+    # Nor do they move the zero: the filter does not undo the clipping, and with them it lies below.
+    assert found.zero == pytest.approx(0.0, abs=1e-4)
+    assert mean_offset([seen], found.undone) < -0.01
 
 
 @pytest.mark.parametrize(("more", "is_plain"), [(0.999, False), (1.001, True), (np.nan, True)])
@@ -256,7 +264,7 @@ def test_what_has_no_name_and_is_taken_off_by_the_clock_is_said_to_go_on(one: Se
     def told(model: ExtendedModel, *named: str) -> list[str]:
         nothing = ForceError(0.0, 0.0)
         undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
-        return going_on_of(Compensation(model, nothing, nothing, nothing, undone_by), named, STANDARD)
+        return going_on_of(Compensation([one], model, nothing, nothing, nothing, undone_by), named, STANDARD)
 
     (said,) = told(drifting)
     assert "(zero drift by -7.2 %)" in said
@@ -269,7 +277,8 @@ def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
     nothing = ForceError(0.0, 0.0)
     for model, names in ((late, ("dead_band",)), (MODEL, ())):
-        found = Compensation(model, nothing, nothing, nothing, ExtendedCompensator(model, 1.0 / one.conditions.step_s))
+        undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
+        found = Compensation([one], model, nothing, nothing, nothing, undone_by)
         assert found.undone.names == names
     assert found.undone is MODEL
 
@@ -598,9 +607,8 @@ def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_th
     judged = own_zeros([sessions[0], held], MODEL, STANDARD)  # what is judged has one too, and makes no mean
     assert judged is not None
     # One zero for both is off by half of what they differ by; and one recording that begins so is told.
-    mean = float(np.mean(zeros.offsets))
-    (said,) = as_calibrated(sessions, MODEL, mean, STANDARD)
+    (said,) = as_calibrated(compensation(sessions, MODEL, MODEL, STANDARD), STANDARD)
     off_n = 0.025 / MODEL.gain * scale.load_n
     assert float(said.split("is off by ")[1].split(" N (rms)")[0]) == pytest.approx(off_n, rel=0.2)
     alike, _ = sessions_of(clean[0], clean[1])
-    assert as_calibrated(alike, MODEL, float(np.mean(offsets(alike, MODEL))), STANDARD) == []
+    assert as_calibrated(compensation(alike, MODEL, MODEL, STANDARD), STANDARD) == []
