@@ -92,9 +92,12 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
         says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
         return [Statement(OF_A_DOUBTED_CAUSE, name.kind_probability, thresholds.least_confidence, says)]
     if name.kind_only:
+        why = "no equation of its kind fits better than others"
+        if not name.equivalents:
+            why = f"{in_words(name.effect.name)} is by far the nearest, and misses more than equations do"
         says = (
-            "what it does to the reading is sure, by which law it does so is not: no equation of its kind fits better"
-            " than others, and it may be an effect that the catalogue does not have"
+            f"what it does to the reading is sure, by which law it does so is not: {why}, and it may be an effect that"
+            " the catalogue does not have"
         )
         return [Statement(OF_A_KIND, name.kind_probability, thresholds.least_confidence, says)]
     return []

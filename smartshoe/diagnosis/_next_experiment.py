@@ -32,6 +32,8 @@ SHOWN_BY: dict[Exposure, str] = {
     "steps": "steps",
 }
 
+EITHER = "use either, they read too nearly alike"
+
 
 def next_experiment(
     found: Inference,
@@ -104,7 +106,13 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     channel = None if word is None else in_words(word)
     if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
         most = max((then.margin - now.margin for _, then in foretold), default=0.0)
-        instead = "use either, they read too nearly alike" if word is None else f"what would is {SAYS[word]}"
+        clip = [name for name in (cause.name, rival) if effect(name).clips]
+        alike = (
+            f"they read too nearly alike; where it is {in_words(clip[0])} no force can be had"
+            if len(clip) == 1
+            else EITHER
+        )
+        instead = alike if word is None else f"what would is {SAYS[word]}"
         says = f"no protocol is expected to rule out either of {both}: {instead}"
         return NextExperiment(names, None, channel, says, most)
     protocol, then = chosen

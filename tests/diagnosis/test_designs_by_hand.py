@@ -331,6 +331,9 @@ def test_what_no_protocol_tells_better_asks_for_a_channel_or_for_nothing(monkeyp
     assert (told.protocol, told.channel, told.expected_margin, told.steps) == (None, None, 85.0, None)
     no_use = f"no protocol is expected to rule out either of {BOTH}: "
     assert told.says == no_use + "use either, they read too nearly alike"
+    clip = _cause("sensor_nonlinearity", 0.3, ("saturation",), ())
+    told = _next(monkeypatch, [clip], {"sensor_nonlinearity": contests["linear_leak"]})
+    assert told.says.endswith("they read too nearly alike; where it is saturation no force can be had")
     told = _next(monkeypatch, [_cause(*LEAK)], contests, channel="pressure_reference")
     assert (told.protocol, told.channel) == (None, "pressure reference")
     assert told.says == no_use + f"what would is {SAYS['pressure_reference']}"

@@ -268,6 +268,7 @@ def _told(
     alone: Any = None,
     kind: float = 0.9,
     alternatives: Any = (),
+    equivalents: tuple[str, ...] = ("orifice_leak",),
 ) -> Any:
     asked: list[Any] = []
 
@@ -295,7 +296,7 @@ def _told(
         effect=one,
         kind_probability=kind,
         law_probability=0.6,
-        equivalents=("orifice_leak",),
+        equivalents=equivalents,
         kind_only=kind_only,
         is_sure=is_sure,
         by=by,
@@ -309,7 +310,7 @@ def _told(
         fitted = ("linear_leak's fit", "linear_leak")
     assert cause.parameters == {"of": (*fitted, SCALE)}
     assert (cause.effect, cause.confidence, cause.law_confidence) == (one, confidence_of(name, STANDARD), 0.6)
-    assert (cause.equivalents, cause.size) == (("orifice_leak",), 0.0123)
+    assert (cause.equivalents, cause.size) == (equivalents, 0.0123)
     assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
     return cause
 
@@ -348,6 +349,8 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
         "what it does to the reading is sure, by which law it does so is not: no equation of its kind fits better than"
         " others, and it may be an effect that the catalogue does not have"
     )
+    alone = _told(monkeypatch, exposed, kind_only=True, equivalents=()).evidence[-1]
+    assert "by which law it does so is not: linear leak is by far the nearest, and misses more than" in alone.says
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
     named = "it is not sure, since other effects fit nearly as well; it is named because"
