@@ -21,8 +21,11 @@ def numbers_of(values: ArrayLike, what: str) -> Array:
     None counts as NaN, as in a table read elsewhere.
     """
     try:
-        if getattr(getattr(values, "dtype", None), "kind", "") == "c":  # numpy would drop the imaginary part
+        kind = getattr(getattr(values, "dtype", None), "kind", None) or np.asarray(values).dtype.kind
+        if kind == "c":  # numpy would drop the imaginary part
             raise TypeError("complex numbers")
+        if kind in "mM":  # numpy would count nanoseconds, or days
+            raise TypeError("dates or durations: seconds are (t - t[0]) / numpy.timedelta64(1, 's')")
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what}: not all are real numbers ({error}): give these, NaN where one is missing") from error

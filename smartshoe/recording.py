@@ -184,8 +184,8 @@ class Recording(Summarised):
     ) -> Self:
         """A recording from arrays named as a plain table's columns: ``force_n=``, ``pressure_mbar=``, ...
 
-        NaN marks a missing sample. Raises `UnitError` for a name without a unit, `InputError` for shapes that
-        differ or time that does not increase.
+        NaN marks a missing sample. Raises `UnitError` for a name without a unit, `InputError` for what is no number,
+        shapes that differ or time that does not increase.
         """
         channels: dict[str, Channel] = {}
         for column, values in columns.items():
@@ -198,7 +198,7 @@ class Recording(Summarised):
                 key: replace(one, role="auxiliary") if one.role == "sensor" and key != SENSOR_NAME else one
                 for key, one in channels.items()
             }
-        return cls(np.asarray(time_s, dtype=float), channels, name, unit, dict(metadata or {}))
+        return cls(numbers_of(time_s, f"{name}: time_s"), channels, name, unit, dict(metadata or {}))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Recordings travel between processes, though a mapping proxy does not."""

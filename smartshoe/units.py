@@ -56,6 +56,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("N", "n", "force", 1.0, 0.0, ("newton", "newtons", "牛", "牛顿")),
     ("kN", "kn", "force", 1e3, 0.0, ("kilonewton", "千牛")),
     ("mN", "millinewton", "force", 1e-3, 0.0, ()),
+    ("MN", "meganewton", "force", 1e6, 0.0, ()),
     ("daN", "dan", "force", 10.0, 0.0, ()),
     ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # of a load cell that reads mass
     ("gf", "gf", "force", 9.80665e-3, 0.0, ()),
@@ -64,6 +65,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("hPa", "hpa", "pressure", 100.0, 0.0, ()),
     ("kPa", "kpa", "pressure", 1e3, 0.0, ("千帕",)),
     ("MPa", "megapascal", "pressure", 1e6, 0.0, ("n/mm^2", "n/mm2", "兆帕")),
+    ("mPa", "millipascal", "pressure", 1e-3, 0.0, ()),
     ("mbar", "mbar", "pressure", 100.0, 0.0, ("毫巴",)),
     ("bar", "bar", "pressure", 1e5, 0.0, ("巴",)),
     ("psi", "psi", "pressure", 6894.757293168, 0.0, ()),
@@ -88,6 +90,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("ohm", "ohm", "resistance", 1.0, 0.0, ("Ω", "ohms")),
     ("kohm", "kohm", "resistance", 1e3, 0.0, ("kΩ",)),
     ("Mohm", "megaohm", "resistance", 1e6, 0.0, ("MΩ",)),
+    ("mohm", "milliohm", "resistance", 1e-3, 0.0, ("mΩ",)),
     ("pF", "pf", "capacitance", 1e-12, 0.0, ()),
     ("nF", "nf", "capacitance", 1e-9, 0.0, ()),
     ("rad", "rad", "angle", 1.0, 0.0, ()),
@@ -110,7 +113,7 @@ _TABLE += [
     if quantity == "pressure"
 ]
 
-# Symbols are case sensitive where case carries meaning (mN and MN, K and k); everything else is not.
+# Symbols are case sensitive where case carries meaning (mN and MN, mΩ and MΩ); everything else is not.
 _BY_SYMBOL: dict[str, Unit] = {}
 _BY_WORD: dict[str, Unit] = {}
 _BY_SUFFIX: dict[str, Unit] = {}
@@ -120,6 +123,7 @@ for _symbol, _suffix, _quantity, _scale, _offset, _words in _TABLE:
     _BY_SUFFIX[_suffix] = _unit
     _BY_WORD.setdefault(unicodedata.normalize("NFKC", _symbol).casefold(), _unit)
     for _word in _words:
+        _BY_SYMBOL.setdefault(unicodedata.normalize("NFKC", _word), _unit)
         _BY_WORD.setdefault(unicodedata.normalize("NFKC", _word).casefold(), _unit)
 _BY_SUFFIX["kg"] = _BY_SUFFIX["kgf"]  # as of a header's "(kg)": nothing here has a mass
 _BY_SUFFIX |= {word: unit for word, unit in _BY_WORD.items() if unit.quantity == "time"}  # timestamp_seconds

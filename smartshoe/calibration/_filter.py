@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array, numbers_of
-from smartshoe.errors import InputError
+from smartshoe.errors import InputError, UsageError
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit
+
+SAME_RATE = 0.01  # by which a step may be off that counts as even
 
 
 class ForceFilter(ABC):
@@ -51,9 +53,10 @@ class ForceFilter(ABC):
         """Force (n,) in N of a whole signal (n,), from a fresh start; the state of `push` stays as it is.
 
         A `Channel`, or the one sensor of a `Recording`, is converted to ``reading_unit``; raises `UnitError` where
-        that cannot be.
+        that cannot be, and `UsageError` where a recording has another rate than the filter.
         """
         if isinstance(readings, Recording):
+            self._require_rate_of(readings)
             readings = readings.sensor
         if isinstance(readings, Channel):
             values = readings.values if self.reading_unit is None else readings.in_unit(self.reading_unit)
@@ -62,6 +65,16 @@ class ForceFilter(ABC):
         if values.ndim != 1:
             raise InputError(f"readings have shape {values.shape}: give one number per sample")
         return self._copy()._push_block(values)
+
+    def _require_rate_of(self, recording: Recording) -> None:
+        """Raises `UsageError` where each sample would be taken for longer, or shorter, than it lasted."""
+        if len(recording) < 2 or abs(recording.sample_rate_hz / self.sample_rate_hz - 1.0) <= SAME_RATE:
+            return
+        raise UsageError(
+            f"{recording.label} has {recording.sample_rate_hz:.5g} samples a second and the filter is for"
+            f" {self.sample_rate_hz:g}: take one from compensator({recording.sample_rate_hz:.5g}), or let"
+            " smartshoe.compensate choose the rate"
+        )
 
     @overload
     def push(self, readings: float) -> float: ...

@@ -55,7 +55,8 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
             way = "earlier" if offset_s > 0 else "later"
             says.append(
                 f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}"
-                " to the load's clock before anything else: nothing is said of delays in it"
+                " to the load's clock before anything else: nothing is said of delays in it, and if it is the unit that"
+                " is late, the force of a calibration is as late"
             )
         made.append(recording)
         usable.append(mask)

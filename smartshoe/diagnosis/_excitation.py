@@ -244,22 +244,23 @@ def _most_alike(kinds: Sequence[tuple[float, float]], same: float) -> int:
 
 
 def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: float = 2.0) -> list[float]:
-    """Rates that differ by more than ``same``, and by more than ramps of so few samples tell.
+    """As many rates as differ from one another by more than ``same``, and by more than ramps of so few samples tell.
 
     A ramp of n samples, each a window, lasted n +- ``ends``: half a window and half a step are open at either end, two
-    in all where each window is a step of its own. One stray ramp beside a single rate, a first one say, makes no
-    second rate.
+    in all where each window is a step of its own. Of ramps that may be of one rate the one that is known to be no
+    faster stands for all, so that a few samples of any rate tie no others together. One stray ramp beside others that
+    are alike, a first one say, makes no second rate.
     """
-    found: list[float] = []
-    ramps: list[int] = []
-    reach = 0.0
-    for rate, samples in sorted(rates):
+    between = []
+    for rate, samples in rates:
         n = max(samples, 1.0)
-        if not found or (rate > found[-1] * (1.0 + same) and rate * n / (n + ends) > reach):
+        between.append((rate * n / max(n - ends, 0.1), rate, rate * n / (n + ends)))
+    found: list[float] = []
+    reach = 0.0
+    for most, rate, least in sorted(between):
+        if not found or (rate > found[-1] * (1.0 + same) and least > reach):
             found.append(rate)
-            ramps.append(0)
-            reach = rate * n / max(n - ends, 0.1)
-        ramps[-1] += 1
-    most = max(ramps, default=0)
-    is_single = sum(ramps) - most == 1 and most >= (1.0 - same) * sum(ramps)
-    return [found[ramps.index(most)]] if is_single else found
+            reach = most
+    alike = [sum(one / (1.0 + same) <= rate <= one * (1.0 + same) for rate, _ in rates) for one in found]
+    is_single = len(rates) - max(alike, default=0) == 1 and max(alike) >= (1.0 - same) * len(rates)
+    return [found[alike.index(max(alike))]] if is_single else found

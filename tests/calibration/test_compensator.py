@@ -49,6 +49,20 @@ def test_the_filter_is_the_plain_loop() -> None:
     np.testing.assert_allclose(Compensator(A1, B0, B1).apply(u), plain, rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("by", "is_refused"), [(1.0, False), (1.009, False), (0.991, False), (2.0, True), (0.98, True)]
+)
+def test_a_recording_at_another_rate_is_refused_and_its_own_named(by: float, is_refused: bool) -> None:
+    time_s = np.arange(200) / (100.0 * by)
+    walk = Recording.from_arrays(time_s=time_s, pressure_mbar=np.sin(time_s), name="walk")
+    filter_ = CALIBRATION.compensator(100.0)
+    if is_refused:
+        with pytest.raises(UsageError, match=rf"walk has {100.0 * by:.5g} samples .* compensator\({100.0 * by:.5g}\)"):
+            filter_.apply(walk)
+    else:
+        assert filter_.apply(walk) == pytest.approx(filter_.apply(np.sin(time_s)))
+
+
 def test_apply_leaves_the_stream_alone() -> None:
     one, other = Compensator(A1, B0, B1), Compensator(A1, B0, B1)
     first = one.push(np.array([1.0, 2.0]))

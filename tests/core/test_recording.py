@@ -44,6 +44,24 @@ def test_time_that_does_not_increase_is_refused(time_s: list[float], says: str) 
         Recording.from_arrays(time_s=time_s, force_n=[0, 1, 2])
 
 
+@pytest.mark.parametrize(
+    "time_s",
+    [
+        np.arange(3).astype("datetime64[ms]"),
+        np.arange(3).astype("timedelta64[ms]"),
+        [np.datetime64(k, "s") for k in range(3)],
+        np.arange(3) * 1j,
+        ["a", "b", "c"],
+    ],
+)
+def test_time_that_is_no_number_of_seconds_is_refused(time_s: object) -> None:
+    """numpy takes a date for so many nanoseconds."""
+    with pytest.raises(InputError, match="walk: time_s: not all are real numbers"):
+        Recording.from_arrays(time_s=time_s, force_n=np.ones(3), name="walk")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="channel force: not all are real numbers"):
+        Recording.from_arrays(time_s=np.arange(3), force_n=time_s)  # type: ignore[arg-type]
+
+
 def test_a_column_without_a_unit_is_refused() -> None:
     with pytest.raises(UnitError, match="pressure"):
         Recording.from_arrays(time_s=[0, 1], pressure=[0, 1])

@@ -14,7 +14,8 @@ from smartshoe.units import _TABLE, declared, find_unit, on_one_cm2, unit, unit_
 @pytest.mark.parametrize(
     ("text", "symbol"),
     [("(kN)", "kN"), ("[mbar]", "mbar"), ("sec", "s"), ("SEC", "s"), ("Newtons", "N"), ("毫米", "mm"), ("℃", "°C"),
-     ("mN", "mN"), ("MPa", "MPa"), ("k", "K"), ("mbar ", "mbar")],
+     ("mN", "mN"), ("MPa", "MPa"), ("k", "K"), ("mbar ", "mbar"),
+     ("MN", "MN"), ("mPa", "mPa"), ("mpa", "MPa"), ("mΩ", "mohm"), ("MΩ", "Mohm"), ("KPA", "kPa"), ("MBAR", "mbar")],
 )  # fmt: skip
 def test_header_texts_are_understood(text: str, symbol: str) -> None:
     assert unit(text).symbol == symbol
@@ -77,6 +78,7 @@ _DEFINED = (
     (29.921, "inHg", 101325.0), (1.0, "kgf/cm2", _STANDARD_GRAVITY * 1e4), (1.0, "Pa", 1.0),
     (1.0, "cmH2O", _STANDARD_GRAVITY * 10.0), (1.0, "lbf", _POUND_KG * _STANDARD_GRAVITY), (1.0, "N", 1.0),
     (1.0, "kgf", _STANDARD_GRAVITY), (1000.0, "gf", _STANDARD_GRAVITY), (1.0, "kN", 1e3), (1.0, "daN", 10.0),
+    (1.0, "MN", 1e6), (1000.0, "mPa", 1.0), (1000.0, "mohm", 1.0),
     (1.0, "mN", 1e-3), (1.0, "s", 1.0), (1.0, "ms", 1e-3), (1.0, "us", 1e-6), (1.0, "min", 60.0), (1.0, "h", 3600.0),
     (1.0, "m", 1.0), (1.0, "cm", 1e-2), (1.0, "mm", 1e-3), (1.0, "um", 1e-6), (1.0, "in", _INCH_M),
     (60.0, "mm/min", 1e-3), (1.0, "m/s", 1.0), (1.0, "mm/s", 1e-3), (1.0, "m/s^2", 1.0), (1.0, "N/s", 1.0),

@@ -243,6 +243,9 @@ def test_rates_of_short_ramps_differ_by_more_than_two_samples_at_either_end() ->
     assert len(_distinct_rates([(1.0, 0), (9.999, 10**6)], 0.25)) == 1
     assert len(_distinct_rates([(1.0, 10**6), (3.001, 0)], 0.25)) == 2
     assert len(_distinct_rates([(1.0, 10**6), (2.999, 0)], 0.25)) == 1
+    # Those of a few samples, which may be of any rate, tie no others together, and are no strays beside them.
+    quick = [(0.06, 40), (0.25, 10), (0.5, 5), (1.1, 2), (1.25, 2)]
+    assert _distinct_rates([*quick * 3, *[(1.2, 1)] * 20], 0.25) == [0.06, 0.25, 0.5]
 
 
 def test_ramps_sampled_finely_are_open_by_their_windows_and_by_less_than_one_more() -> None:
