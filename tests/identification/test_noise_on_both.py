@@ -55,6 +55,22 @@ def test_auto_stays_with_the_plain_fit_where_the_input_is_exact() -> None:
     assert not any("noisy as well" in note for note in found.notes)
 
 
+def test_counts_that_are_coarse_beside_their_noise_are_noise_and_intervals_hold_the_truth() -> None:
+    """Of 200 counts a span their noise of a fifth of one does not show, and a plain fit was off by ten intervals."""
+    clean = press(rates=SIX_RATES, repeats=2, rest_s=1.0)
+    count = np.ptp(clean.sensor.values) / 200.0
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        read = clean.sensor.values + 0.2 * count * rng.standard_normal(len(clean))
+        coarse = Recording.from_arrays(
+            time_s=clean.time_s, force_n=clean.force_n, pressure_mbar=count * np.round(read / count)
+        )
+        found = identify(coarse)
+        assert found.estimator == "errors_in_variables"
+        low, high = found.parameters["a1"].ci95
+        assert low <= A1 <= high
+
+
 @pytest.mark.parametrize(("command", "chosen"), [(True, "command"), (False, "errors_in_variables")])
 def test_auto_allows_for_the_readings_noise_and_says_why(command: bool, chosen: str) -> None:
     found = identify(press(load_noise=2.23, reading_noise=3.0, command=command))
