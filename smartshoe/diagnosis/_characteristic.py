@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -77,10 +78,24 @@ def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:
     found = branches_of(recording, thresholds)
     if found is None or found.by_curve >= thresholds.follows or found.by_branch < thresholds.follows:
         return None
-    return _friction(found)
+    return _friction(found, thresholds)
 
 
-def _friction(found: Branches) -> str:
+def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
+    """Whether the branches lie as far apart, the same way, in either half: those of what wanders are chance."""
+    middle_s = 0.5 * float(recording.time_s[0] + recording.time_s[-1])
+    ends_s = (float(recording.time_s[0]), middle_s, float(recording.time_s[-1]))
+    halves = [branches_of(recording.between(*span), thresholds) for span in pairwise(ends_s)]
+    if any(one is None for one in halves):
+        return False
+    first, second = (one.ups - one.downs for one in halves if one is not None)
+    lower, upper = sorted((float(np.median(first)), float(np.median(second))), key=abs)
+    return lower * upper > 0.0 and abs(upper) < thresholds.clear * abs(lower)
+
+
+def _friction(found: Branches, thresholds: Thresholds) -> str | None:
+    if not _comes_back(found.recording, thresholds):
+        return None
     sensor = found.recording.sensor
     half = 0.5 * float(np.median(found.ups - found.downs))
     return (
@@ -97,7 +112,7 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     if found is None or max(found.by_curve, found.by_branch) < thresholds.follows:
         return None
     if found.by_curve < thresholds.follows:
-        return _friction(found)
+        return _friction(found, thresholds)
     sensor, place = recording.sensor, found.place
     half_span = 0.5 * float(place[-1] - place[0])
     u = (place - 0.5 * (place[0] + place[-1])) / half_span
