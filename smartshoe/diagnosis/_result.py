@@ -310,7 +310,15 @@ class Diagnosis(Summarised):
             f"{self.verdict.replace('_', ' ')}: {self.says}",
             ["cause", "or it is", "confidence", "size % of full scale", "gain on held-out data %"],
             rows,
-            self.limits,
+            (
+                *(
+                    f"fault of the data: {in_words(fault.kind)}, {fault.label}: {fault.says}"
+                    for fault in self.data_faults
+                ),
+                *([f"what is left: {self.leftover}"] if self.leftover else []),
+                *(f"limit: {limit}" for limit in self.limits),
+                *([f"next: {self.next_experiment.says}"] if self.next_experiment else []),
+            ),
         )
 
     def to_dict(self) -> dict[str, Any]:

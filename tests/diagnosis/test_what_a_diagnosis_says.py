@@ -12,6 +12,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, NextExperiment, Rival, Statement, Trace
 from smartshoe.errors import NotIdentifiableError
+from smartshoe.integrity import DataFault
 from smartshoe.models import Parameter
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
@@ -134,3 +135,18 @@ def test_a_summary_tells_each_cause_in_percent() -> None:
     told = replace(FOUND, causes=(surest,)).summary()
     assert "over 99 %" in told  # as anywhere: what is meant may be another, and nothing is certain
     assert "orifice leak" in told
+
+
+def test_a_summary_tells_what_the_command_tells_beside_the_causes() -> None:
+    hum = DataFault("held_samples", 0, "run_1.csv", 0.0, 9.0, 0.1, "three samples in ten are held")
+    repeat = NextExperiment((), "repeat", None, "repeat the load cycle")
+    told = replace(FOUND, data_faults=(hum,), leftover="a third lies in holds", next_experiment=repeat).summary()
+    for line in (
+        "fault of the data: held samples, run_1.csv: three samples in ten are held",
+        "what is left: a third lies in holds",
+        *(f"limit: {limit}" for limit in FOUND.limits),
+        "next: repeat the load cycle",
+    ):
+        assert line in told.splitlines()
+    bare = replace(FOUND, data_faults=(), leftover=None, next_experiment=None, limits=()).summary()
+    assert not any(word in bare for word in ("fault of", "what is left", "limit: ", "next: "))
