@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, Index, Mask, numbers_of
 from smartshoe.display import Summarised, SummaryTable, first_names, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
-from smartshoe.stamps import mean_step_s, rounded_grid_step_s, usual_step_s
+from smartshoe.stamps import SAME_STEP, mean_step_s, rounded_grid_step_s, usual_step_s
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
 
 if TYPE_CHECKING:
@@ -256,7 +256,7 @@ class Recording(Summarised):
     def is_uniform(self) -> bool:
         """Whether every step is within 1 % of the median step."""
         step = np.diff(self.time_s)
-        return bool(step.size == 0 or np.all(np.abs(step - np.median(step)) <= 0.01 * np.median(step)))
+        return bool(step.size == 0 or np.all(np.abs(step - np.median(step)) <= SAME_STEP * np.median(step)))
 
     def plot(self) -> Figure:
         """A figure: every channel over time, those of one unit of measurement on one axis; NaN leaves a gap."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 
+SAME_STEP = 0.01  # share by which steps may differ that count as one
 _GAP = 1.75  # usual steps: where two stamps lie further apart a sample is missing
 _MOST_DIGITS = 12  # stamps with more were not rounded
 _PASSES = 3  # each with a better step, which numbers longer gaps
@@ -84,4 +85,4 @@ def _rounding_s(time_s: Array) -> float:
     return max(last(np.ones(1), 1.0), last(first, float(first.max())))
 
 
-__all__ = ["mean_step_s", "rounded_grid_step_s", "usual_step_s"]
+__all__ = ["SAME_STEP", "mean_step_s", "rounded_grid_step_s", "usual_step_s"]

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, numbers_of
 from smartshoe.errors import InputError, UsageError
 from smartshoe.recording import Channel, Recording
+from smartshoe.stamps import SAME_STEP
 from smartshoe.units import Unit
-
-SAME_RATE = 0.01  # by which a step may be off that counts as even
 
 
 class ForceFilter(ABC):
@@ -68,7 +67,7 @@ class ForceFilter(ABC):
 
     def _require_rate_of(self, recording: Recording) -> None:
         """Raises `UsageError` where each sample would be taken for longer, or shorter, than it lasted."""
-        if len(recording) < 2 or abs(recording.sample_rate_hz / self.sample_rate_hz - 1.0) <= SAME_RATE:
+        if len(recording) < 2 or abs(recording.sample_rate_hz / self.sample_rate_hz - 1.0) <= SAME_STEP:
             return
         raise UsageError(
             f"{recording.label} has {recording.sample_rate_hz:.5g} samples a second and the filter is for"

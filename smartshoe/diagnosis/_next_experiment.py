@@ -32,8 +32,6 @@ SHOWN_BY: dict[Exposure, str] = {
     "steps": "steps",
 }
 
-EITHER = "use either, they read too nearly alike"
-
 
 def next_experiment(
     found: Inference,
@@ -106,13 +104,12 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     channel = None if word is None else in_words(word)
     if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
         most = max((then.margin - now.margin for _, then in foretold), default=0.0)
-        clip = [name for name in (cause.name, rival) if effect(name).clips]
-        alike = (
-            f"they read too nearly alike; where it is {in_words(clip[0])} no force can be had"
-            if len(clip) == 1
-            else EITHER
-        )
-        instead = alike if word is None else f"what would is {SAYS[word]}"
+        clips = [in_words(name) for name in (cause.name, rival) if effect(name).clips]
+        instead = "use either, they read too nearly alike"
+        if len(clips) == 1:
+            instead = f"they read too nearly alike; where it is {clips[0]} no force can be had"
+        if word is not None:
+            instead = f"what would is {SAYS[word]}"
         says = f"no protocol is expected to rule out either of {both}: {instead}"
         return NextExperiment(names, None, channel, says, most)
     protocol, then = chosen
