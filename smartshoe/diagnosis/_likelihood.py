@@ -24,12 +24,12 @@ KNOWN_TO = 0.01  # of what a fit costs more than one that it is compared with: l
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 
 
-def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) -> Array:
-    """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`."""
-    reading, slopes = model.sensitivities(session.conditions, trace)
-    rows = np.empty((reading.size, 1 + slopes.shape[1]), order="F")
+def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None, spare: int = 0) -> Array:
+    """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`; ``spare`` columns."""
+    count = len(model.parameters)
+    rows = np.empty((session.reading.size, 1 + count + spare), order="F")
+    reading, _ = model.sensitivities(session.conditions, trace, rows[:, 1 : 1 + count])
     rows[:, 0] = session.reading - reading
-    rows[:, 1:] = slopes
     return rows
 
 
@@ -82,10 +82,11 @@ class Likelihood:
         """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p); ``rows`` where they are known."""
         if rows is None:
             known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
-            rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
-        self._rows = [np.empty((one.shape[0], one.shape[1] + 1), order="F") for one in rows]
-        for own, one in zip(self._rows, rows, strict=True):
-            own[:, :-1] = one  # they are brought up to date in place
+            self._rows = [rows_of(model, *one, spare=1) for one in zip(self.sessions, known, strict=True)]
+        else:
+            self._rows = [np.empty((one.shape[0], one.shape[1] + 1), order="F") for one in rows]
+            for own, one in zip(self._rows, rows, strict=True):
+                own[:, :-1] = one  # they are brought up to date in place
         return self._products(model)
 
     def nearly_normal(self, model: ExtendedModel, step: Array) -> tuple[float, Array, Array]:

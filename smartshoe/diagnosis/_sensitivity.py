@@ -302,7 +302,8 @@ def linearised(
             columns[:, column] = reading - without.simulate(session.conditions)
             columns[:, 0] += columns[:, column]
         for added, by in beyond:
-            columns[:, list(added.columns)] = model.column_of(by, session.conditions, trace)
+            first = added.columns[0]
+            model.column_of(by, session.conditions, trace, columns[:, first : first + len(by)])
         for one in kept:
             assert beside is not None
             of = list(known[_place(one)])

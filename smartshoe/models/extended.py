@@ -119,7 +119,7 @@ class ExtendedModel:
         """This model without the effect ``name``."""
         return replace(self, parts=tuple(part for part in self.parts if part.name != name))
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The effects in it."""
         return tuple(part.name for part in self.parts)
@@ -199,16 +199,18 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, self.core if alike else None))
         return tuple(made)
 
-    def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
+    def sensitivities(
+        self, conditions: Conditions, trace: Trace | None = None, out: Array | None = None
+    ) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
         The chain is run anew only from the first block that a parameter moves.
-        ``trace``: this model's own under the same conditions, where it is known.
+        ``trace``: this model's own under the same conditions, where it is known; ``out`` takes the derivatives.
         """
         trace = trace or self.trace(conditions)
-        out = np.empty((trace[0].size, 1 + len(self._varied)), order="F")
-        out[:, 0] = trace[0] / self.gain
-        out[:, 1:] = self.column_of(self._varied, conditions, trace)
+        out = np.empty((trace[0].size, 1 + len(self._varied)), order="F") if out is None else out
+        np.divide(trace[0], self.gain, out=out[:, 0])
+        self.column_of(self._varied, conditions, trace, out[:, 1:])
         return trace[0], out
 
     def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
@@ -237,12 +239,14 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, None if in_core else self.core))
         return tuple(made)
 
-    def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
+    def column_of(
+        self, by: Sequence[Extension], conditions: Conditions, trace: Trace, out: Array | None = None
+    ) -> Array:
         """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
         reading, inputs = trace
-        out = np.empty((reading.size, len(by)), order="F")
+        out = np.empty((reading.size, len(by)), order="F") if out is None else out
         for column, one in enumerate(by):
-            out[:, column] = one.slope(reading, inputs, conditions)
+            one.slope(reading, inputs, conditions, out[:, column])
         return out
 
     # -- to and from a file ---------------------------------------------------------------------------------------
@@ -294,10 +298,11 @@ class Extension:
     first: int
     core: Core | None
 
-    def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions) -> Array:
-        """The reading's derivative (n,), ``inputs`` being what goes into each block of the model that did not move."""
+    def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions, out: Array) -> None:
+        """The reading's derivative, into ``out`` (n,); ``inputs``: what goes into each block of what did not move."""
         moved = self.model._run(inputs[self.first], conditions, self.first, core=self.core)
-        return (moved - reading) / self.step
+        np.subtract(moved, reading, out=out)
+        out /= self.step
 
 
 Extensions = tuple[Extension, ...]
