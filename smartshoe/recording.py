@@ -301,7 +301,7 @@ class Recording(Summarised):
         found = self.of_role("load")
         if not found:
             raise MissingChannelError(
-                f"{self.label} has no reference load; name its column with --force, for example --force 'Load[N]'"
+                f"{self.label} has no reference load; {self._named_by('--force', 'Load[N]', 'force_n')}"
                 f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]
@@ -317,13 +317,20 @@ class Recording(Summarised):
         found = self.sensors
         if len(found) != 1:
             what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
-            likely = [one.name for one in found or self.of_role("auxiliary")]
-            example = f", for example --sensor '{likely[0]}'" if likely else ""
+            likely = next((one.name for one in found or self.of_role("auxiliary")), "")
             raise MissingChannelError(
-                f"{self.label} has {what}; name one column with --sensor{example}"
+                f"{self.label} has {what}; {self._named_by('--sensor', likely, 'pressure_v')}"
                 f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]
+
+    def _named_by(self, option: str, column: str, array: str) -> str:
+        """How a person says which column is meant: of a file by an ``option``, of arrays by their names."""
+        if not self.source:
+            name, unit_ = array.split("_")
+            return f"name its array {name}_ and its unit, for example {name}_{unit_}="
+        example = f", for example {option} '{column}'" if column else ""
+        return f"name its column with {option}{example}"
 
     @property
     def force_n(self) -> Array:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -31,7 +34,7 @@ def test_a_shoes_units_are_sensors_in_order() -> None:
     assert [channel.name for channel in shoe.sensors] == ["left_toe", "left_heel"]
     with pytest.raises(MissingChannelError, match="2 readings"):
         _ = shoe.sensor
-    with pytest.raises(MissingChannelError, match="--force"):
+    with pytest.raises(MissingChannelError, match="array force_"):
         _ = shoe.load
 
 
@@ -65,6 +68,18 @@ def test_time_that_is_no_number_of_seconds_is_refused(time_s: object) -> None:
 def test_a_column_without_a_unit_is_refused() -> None:
     with pytest.raises(UnitError, match="pressure"):
         Recording.from_arrays(time_s=[0, 1], pressure=[0, 1])
+
+
+def test_whoever_gives_arrays_is_told_their_names_and_whoever_gives_a_file_its_option() -> None:
+    bare = Recording.from_arrays(time_s=[0.0, 1.0], load_n=[1.0, 2.0], voltage_v=[1.0, 2.0])
+    for of, array, option in (
+        (lambda one: one.load, "name its array force_ and its unit, for example force_n=", "--force 'Load[N]'"),
+        (lambda one: one.sensor, "its unit, for example pressure_v=", "for example --sensor 'load'"),
+    ):
+        with pytest.raises(MissingChannelError, match=array):
+            of(bare)
+        with pytest.raises(MissingChannelError, match=re.escape(option)):
+            of(replace(bare, source="walk.csv"))
 
 
 def test_arrays_are_copies_and_read_only() -> None:
