@@ -58,6 +58,7 @@ class ExtendedCompensator(ForceFilter):
         self._noise = model.noise / model.gain  # of the signal, as far as it is undone
         leaks = (part for part in model.parts if part.effect.is_leak)
         self._moved: dict[str, float] = {}
+        self._left_s: dict[str, float] = {}
         self._cautions = {part.name: LEAK_CAUTION for part in leaks if not part.effect.is_null(part.values)}
         for part in reversed(model.chain):
             if part is None:
@@ -68,6 +69,7 @@ class ExtendedCompensator(ForceFilter):
         self.not_inverted = MappingProxyType(self._passed_over)
         self.cautions = MappingProxyType(self._cautions)
         self.moved_in_an_hour = MappingProxyType(self._moved)
+        self.lags_left_s = MappingProxyType(self._left_s)
         self.reset()
 
     def _undo(self, part: Part) -> None:
@@ -95,10 +97,11 @@ class ExtendedCompensator(ForceFilter):
             self._cautions[part.name] = f"undoing it raises fast noise of the readings {raised:.3g} times"
             return
         limit = NoiseLimit(MOST / raised)
+        self._left_s[part.name] = limit.lag_steps * self.step_s
         self._blocks.append((f"{part.name}_limit", limit))
         self._cautions[part.name] = (
             f"undoing it would raise fast noise of the readings {raised:.3g} times: smoothed to {MOST:g} times, which"
-            f" leaves a lag of {1e3 * limit.lag_steps * self.step_s:.3g} ms"
+            f" leaves a lag of {1e3 * self._left_s[part.name]:.3g} ms"
         )
 
     def _undo_core(self) -> None:
@@ -164,4 +167,4 @@ def _why_not(part: Part) -> str:
     channels = sorted({*effect.needs, *(one.channel for one in strengths if one.channel)})
     if channels:
         return f"it follows another channel ({', '.join(channels)}), which one unit's readings do not carry"
-    return effect.why_not_undone
+    return effect.why_not_undone or "it has no inverse that runs on a stream of readings"

@@ -154,6 +154,15 @@ def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
     return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
+def late_of(found: Compensation) -> list[str]:
+    """What is said of latencies that are undone in part, since the rest would make too much of the noise."""
+    return [
+        f"the calibration leaves {1e3 * left_s:.3g} ms of the {in_words(name)}: undoing all of it would raise"
+        " fast noise too much, and where loads are quicker than those judged here the force is as late"
+        for name, left_s in found.filter.lags_left_s.items()
+    ]
+
+
 def going_on_of(found: Compensation, named: Collection[str], thresholds: Thresholds) -> list[str]:
     """What is said of effects that are not ``named`` and that a calibration takes off by the clock, on and on."""
     said = [
@@ -176,12 +185,19 @@ def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
     It takes one zero for all recordings, that of what it undoes, and begins each as a unit that bore nothing before.
     """
     model, there = found.model, [one for one in found.fine if one.usable.any()]
+    scale_n = model.full_scale_load_n
     off_n = [_rms([_off_by_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there]
     worst = max(range(len(there)), key=off_n.__getitem__)
     worst_n, name = off_n[worst], there[worst].recording.name
-    told_n = _rms([_off_n(there[worst], model)], [there[worst].usable])
-    if worst_n <= thresholds.clear * max(told_n, thresholds.tolerable * model.full_scale_load_n):
-        return []
+    told_n, least_n = _rms([_off_n(there[worst], model)], [there[worst].usable]), thresholds.tolerable * scale_n
+    if worst_n <= thresholds.clear * max(told_n, least_n):
+        held_n = found.error.held_out_n
+        if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
+            return []
+        return [
+            f"the force of {name} is off by {worst_n:.2g} N (rms), that of what is held out by"
+            f" {held_n:.2g} N, which is no figure for such loads"
+        ]
     return [
         "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
         f" {name} is off by {worst_n:.2g} N (rms); with its own zero, and what it bore before, allowed for it would be"

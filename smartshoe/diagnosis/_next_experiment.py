@@ -104,10 +104,11 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     channel = None if word is None else in_words(word)
     if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
         most = max((then.margin - now.margin for _, then in foretold), default=0.0)
-        clips = [in_words(name) for name in (cause.name, rival) if effect(name).clips]
+        lost = [name for name in (cause.name, rival) if effect(name).why_not_undone]
         instead = "use either, they read too nearly alike"
-        if len(clips) == 1:
-            instead = f"they read too nearly alike; where it is {clips[0]} no force can be had"
+        if len(lost) == 1:
+            why = effect(lost[0]).why_not_undone
+            instead = f"they read too nearly alike, but the {in_words(lost[0])} stays in the force, since {why}"
         if word is not None:
             instead = f"what would is {SAYS[word]}"
         says = f"no protocol is expected to rule out either of {both}: {instead}"

@@ -17,6 +17,7 @@ from smartshoe.diagnosis._force import (
     compensation,
     force_of,
     going_on_of,
+    late_of,
     not_undone_of,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
@@ -266,6 +267,7 @@ def _limits_of_the_force(
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
         *force_of(force),
         *clipped_of(force),
+        *late_of(force),
         *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
         *([] if force.is_plain else going_on_of(force, of_causes, thresholds)),
         *named.of_zeros,

@@ -65,7 +65,10 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             " over its range)"
         )
     said += _flat_above(kept, scale, thresholds)
-    said += _foreign([(one.recording.name, gain) for one, gain in zip(fitted, within, strict=True)], thresholds)
+    judged = [one for one in sessions if one.fitted.sum() <= 10 < one.judged.sum()]
+    beside = [_gain(one.conditions.load[one.judged], one.reading[one.judged], thresholds.follows) for one in judged]
+    named = [one.recording.name for one in (*fitted, *judged)]
+    said += _foreign(list(zip(named, (*within, *beside), strict=True)), thresholds)
     said += _unlike(fitted, thresholds)
     between = _between(kept, thresholds.same)
     if between is not None and all(gain is not None for gain in within):

@@ -131,7 +131,8 @@ def from_two_clocks(recording: Recording, offset_s: float, more: str, course: st
         "two_clocks",
         np.ones(len(recording), dtype=bool),
         f"load and reading come from two clocks: the reading is {abs(offset_s):.2f} s"
-        f" {'late' if offset_s >= 0 else 'early'}{course}, more {more} (record both by one clock)",
+        f" {'late' if offset_s >= 0 else 'early'}{course}, more {more} (record both by one clock, unless the unit is"
+        " itself that slow under such loads)",
     )
 
 

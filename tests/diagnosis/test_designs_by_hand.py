@@ -333,7 +333,7 @@ def test_what_no_protocol_tells_better_asks_for_a_channel_or_for_nothing(monkeyp
     assert told.says == no_use + "use either, they read too nearly alike"
     clip = _cause("sensor_nonlinearity", 0.3, ("saturation",), ())
     told = _next(monkeypatch, [clip], {"sensor_nonlinearity": contests["linear_leak"]})
-    assert told.says.endswith("they read too nearly alike; where it is saturation no force can be had")
+    assert told.says.endswith("alike, but the saturation stays in the force, since what was clipped is lost")
     told = _next(monkeypatch, [_cause(*LEAK)], contests, channel="pressure_reference")
     assert (told.protocol, told.channel) == (None, "pressure reference")
     assert told.says == no_use + f"what would is {SAYS['pressure_reference']}"

@@ -29,7 +29,7 @@ SCREENED = ("delay", "flexible_lag", "linear_leak", "dead_band", "rate_gain", "w
 SCREENING = tuple((name, float(k)) for k, name in enumerate(SCREENED))
 FINE: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.05))
 PLAIN_N, EXTENDED_N = ForceError(8.0, 9.0), ForceError(6.0, 7.0)
-FILTER: Any = SimpleNamespace(not_inverted=(), moved_in_an_hour={})  # undoes all
+FILTER: Any = SimpleNamespace(not_inverted=(), moved_in_an_hour={}, lags_left_s={})  # undoes all
 
 
 def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
@@ -552,7 +552,7 @@ def test_a_calibration_takes_the_zero_of_what_its_filter_undoes(
     parts: Any, monkeypatch: pytest.MonkeyPatch, apart: float, has_own: bool
 ) -> None:
     """Of what it does not, as a zero that goes with the room, the mean is the zero's."""
-    late: Any = SimpleNamespace(not_inverted=("delay",), moved_in_an_hour={})
+    late: Any = SimpleNamespace(not_inverted=("delay",), moved_in_an_hour={}, lags_left_s={})
     in_part = Compensation([FINE], MODEL.with_part("delay"), EXTENDED_N, PLAIN_N, EXTENDED_N, late)
     undone = in_part.undone
     assert undone.names == MODEL.names

@@ -24,6 +24,7 @@ from smartshoe.diagnosis._force import (
     force_error,
     force_of,
     going_on_of,
+    late_of,
     not_undone_of,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
@@ -271,6 +272,28 @@ def test_what_has_no_name_and_is_taken_off_by_the_clock_is_said_to_go_on(one: Se
     assert told(drifting, "zero_drift") == []  # a cause is told as one
     assert told(MODEL.with_part("zero_drift", 0.2 * drift)) == []  # hardly anything
     assert told(MODEL) == []
+
+
+def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Session) -> None:
+    """What is held out is slow: its figure is none for what was fitted."""
+    late = MODEL.with_part("sensor_lag", np.array([0.2, 0.3]))
+    nothing, few = ForceError(0.0, 0.0), ForceError(0.0, 0.1)
+    undone_by = ExtendedCompensator(late, 1.0 / one.conditions.step_s)
+    (left_s,) = undone_by.lags_left_s.values()
+    found = Compensation([one], late, nothing, nothing, nothing, undone_by)
+    (said,) = late_of(found)
+    assert said.startswith(f"the calibration leaves {1e3 * left_s:.3g} ms of the sensor lag")
+    assert late_of(replace(found, filter=ExtendedCompensator(MODEL, 1.0 / one.conditions.step_s))) == []
+    quick = replace(one, reading=late.simulate(one.conditions))
+    found = replace(found, fine=[quick], error=few)
+    (said,) = as_calibrated(found, STANDARD)
+    off_n = force_error([quick], late).fitted_n
+    assert off_n > STANDARD.clear * STANDARD.tolerable * late.full_scale_load_n
+    assert said.startswith(
+        f"the force of {one.recording.name} is off by {off_n:.2g} N (rms), that of what is held out by 0.1"
+    )
+    for held_n in (off_n / STANDARD.clear * 1.01, np.nan):  # nearly as far off as what is held out, or none is
+        assert as_calibrated(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
 
 
 def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:

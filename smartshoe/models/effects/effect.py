@@ -218,7 +218,7 @@ class Effect(ABC):
     between_clocks: ClassVar[Literal["lag", "rate"] | None] = None
     is_leak: ClassVar[bool] = False
     clips: ClassVar[bool] = False
-    why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
+    why_not_undone: ClassVar[str] = ""
     is_flexible: ClassVar[bool] = False
     why_unnamed: ClassVar[str] = ""
     is_memoryless: ClassVar[bool] = False

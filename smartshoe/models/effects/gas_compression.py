@@ -24,7 +24,13 @@ class GasCompression(Effect):
     says = "the air stiffens as it is compressed: the reading against load is bent upwards, ever steeper"
     parameters = (
         EffectParameter(
-            "pressure_ratio", "1", "g: gauge pressure at full scale over the ambient one", 0.0, 0.0, 5.0, 0.1
+            "pressure_ratio",
+            "1",
+            "g: gauge pressure at full scale over the ambient one, if N is 1.6",
+            0.0,
+            0.0,
+            5.0,
+            0.1,
         ),
     )
     exposed_by = by("peaks")
