@@ -142,6 +142,7 @@ def diagnosed(
         ),
         limits=(*given.limits, *of_force, *_limits_of_the_names(found, given, named, extended)),
         limits_of_the_force=of_force,
+        clipped=force.clipped,
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,

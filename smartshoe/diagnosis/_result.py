@@ -202,7 +202,8 @@ class Trace:
 class Diagnosis(Summarised):
     """What measured data says of its simulation; `to_dict` is what `smartshoe diagnose --json` writes.
 
-    ``limits_of_the_force``: those of ``limits`` that say where the force of a calibration may be off.
+    ``limits_of_the_force``: those of ``limits`` that say where the force of a calibration may be off; ``clipped``: the
+    share of samples that errors of the force leave out.
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
     ``rejected``: the extended model that what was fitted speaks for, where ``gain`` tells that it is worse on what is
     held out; ``model``, ``extended`` and ``parameters`` are the plain one's then. None where it is not worse.
@@ -232,6 +233,7 @@ class Diagnosis(Summarised):
     next_experiment: NextExperiment | None = None
     limits: tuple[str, ...] = ()
     limits_of_the_force: tuple[str, ...] = ()
+    clipped: float = 0.0
     left_out: tuple[str, ...] = ()
     leftover: str | None = None
     screening: tuple[tuple[str, float], ...] = ()

@@ -160,7 +160,7 @@ def sentence_of(
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
     elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong
-        said = f"{good}, the recordings' own zeros allowed for; {named} is found in these"
+        said = f"{good}, the recordings' own zeros allowed for; found in these: {named}"
     elif worse or best.rmse > baseline.rmse:
         how = "worse" if worse else "no better"
         said = f"{good}; with {named} it is {how} there, good to {by_all}, and it stays as it is"

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from smartshoe.diagnosis import Gain, Rival
 from smartshoe.display import sure
-from smartshoe.models.effects import effect, listed
+from smartshoe.models.effects import effect, listed, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
@@ -28,6 +28,7 @@ from smartshoe.report.diagnosis._sentences import (
     likelier,
     not_in_the_model,
     nothing_left,
+    on_causes,
     parameter_text,
     percent_of_whole,
     ruled_out,
@@ -143,6 +144,25 @@ def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> Non
     of_zeros = replace(made, extended=made.baseline)
     assert heading(of_zeros) == "The simulation is good enough once the zero of the recordings is allowed for"
     assert heading(replace(of_zeros, verdict="partly_explained")).startswith("The simulation is wrong")
+
+
+def test_how_numbers_of_causes_are_read_is_said_where_it_matters() -> None:
+    """The error falls by an offset, and the table below it does not show that."""
+    made = case("one cause")
+    (said,) = on_causes(made)
+    assert "interval is of the noise alone" in said
+    shift = replace(made.causes[0], effect=shift_of("reading"))
+    assert "gives all recordings one zero" in on_causes(replace(made, causes=(*made.causes, shift)))[-1]
+    assert made.model is not None
+    falling = replace(made, model=replace(made.model, full_scale_reading=-made.model.full_scale_reading))
+    assert on_causes(falling)[-1].startswith("The reading falls as the load rises")
+
+
+def test_the_forces_error_is_said_to_be_of_samples_that_are_not_clipped() -> None:
+    made = case("one cause")
+    for clipped, added in ((0.0, ""), (0.264, " (26 % of samples, clipped, left out)")):
+        names = [row.name for row in comparison(replace(made, clipped=clipped))]
+        assert f"error of the compensated force, rms{added}" in names
 
 
 def test_effects_without_a_name_are_told_and_free_forms_as_such() -> None:

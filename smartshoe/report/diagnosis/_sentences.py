@@ -29,6 +29,14 @@ OF_THEIR_OWN = "The simulation is good enough once the zero of the recordings is
 INTERVALS = (
     "A parameter's interval is of the noise alone: where its equation is not exact the value may be off by more."
 )
+TURNED_OVER = (
+    "The reading falls as the load rises, and causes are described for one that rises: read lower for higher, and falls"
+    " for rises."
+)
+OF_ZEROS = (
+    "An offset or a tare takes its part off the error of a simulation that gives all recordings one zero; both"
+    " simulations below have each recording's own."
+)
 LIKELIHOOD = (
     "“Less likely by” and “fits worse by” are differences of −2 log likelihood. “Less likely by 10” is strong evidence."
     " “Fits worse by” takes equations as exact, which they are not, so that it must be much more than 10."
@@ -233,7 +241,7 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
         )  # a model that passes only some effects over has an error of its own
         rows.append(
             Row(
-                "error of the compensated force, rms",
+                "error of the compensated force, rms" + _but_for_clipped(diagnosis),
                 f"{plain(before.force_rmse_n)} N",
                 "by the baseline, see the limits" if by_baseline else f"{plain(after.force_rmse_n)} N",
                 "" if by_baseline else _change(before.force_rmse_n, after.force_rmse_n),
@@ -255,6 +263,10 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
         )
     )
     return rows
+
+
+def _but_for_clipped(diagnosis: Diagnosis) -> str:
+    return f" ({100 * diagnosis.clipped:.2g} % of samples, clipped, left out)" if diagnosis.clipped else ""
 
 
 def what_was_gained(diagnosis: Diagnosis) -> str:
@@ -291,15 +303,14 @@ def _change(before: float, after: float) -> str:
     return "none" if abs(percent) < 0.5 else f"{percent:+.0f} %".replace("-", "−")
 
 
-def turned_over(diagnosis: Diagnosis) -> str:
-    """What is said before causes of a reading that falls as the load rises; empty of any other."""
-    model = diagnosis.model
-    if model is None or model.full_scale_reading * model.gain > 0.0:
-        return ""
-    return (
-        "The reading falls as the load rises, and causes are described for one that rises: read lower for higher, and"
-        " falls for rises."
-    )
+def on_causes(diagnosis: Diagnosis) -> list[str]:
+    """How the causes' numbers and words are to be read."""
+    model, said = diagnosis.model, [INTERVALS]
+    if model is not None and model.full_scale_reading * model.gain <= 0.0:
+        said.append(TURNED_OVER)
+    if any(cause.effect.shifts for cause in diagnosis.causes):
+        said.append(OF_ZEROS)
+    return said
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,6 @@ from smartshoe.diagnosis.design import Design
 from smartshoe.display import sure
 from smartshoe.models.effects import in_words, listed
 from smartshoe.report.diagnosis._sentences import (
-    INTERVALS,
     LIKELIHOOD,
     comparison,
     fault_text,
@@ -24,9 +23,9 @@ from smartshoe.report.diagnosis._sentences import (
     meanings,
     nearest_told,
     not_in_the_model,
+    on_causes,
     parameter_text,
     shares_text,
-    turned_over,
     unnamed,
     what_is_left,
     why_this_one,
@@ -112,9 +111,8 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
             table.add_row(in_words(cause.name) if k == 0 else "", name, value, *of_cause)
     console.print()
     console.print(table)
-    _line(console, INTERVALS)
-    if turned := turned_over(diagnosis):
-        _line(console, turned)
+    for said in on_causes(diagnosis):
+        _line(console, said)
     for cause in diagnosis.causes:
         _line(console, _about(cause))
         for text in (_parameters(cause), not_in_the_model(cause)):
