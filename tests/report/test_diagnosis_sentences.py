@@ -153,9 +153,9 @@ def test_how_numbers_of_causes_are_read_is_said_where_it_matters() -> None:
     assert "interval is of the noise alone" in said
     shift = replace(made.causes[0], effect=shift_of("reading"))
     assert "gives all recordings one zero" in on_causes(replace(made, causes=(*made.causes, shift)))[-1]
-    assert made.model is not None
-    falling = replace(made, model=replace(made.model, full_scale_reading=-made.model.full_scale_reading))
-    assert on_causes(falling)[-1].startswith("The reading falls as the load rises")
+    for reading, told in ((-140.0, True), (140.0, False)):
+        falling = replace(made, model=ExtendedModel(1.1, 0.2, 0.3, 800.0, reading, "mbar"))
+        assert on_causes(falling)[-1].startswith("The reading falls as the load rises") == told
 
 
 def test_the_forces_error_is_said_to_be_of_samples_that_are_not_clipped() -> None:
