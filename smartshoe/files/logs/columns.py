@@ -150,6 +150,7 @@ class _Assignment:
     notes: list[str]
     chosen: set[int] = field(default_factory=set)
     is_turned: bool = False
+    is_pressed_all_over: bool = False
 
     def choose_load(self, force: str) -> None:
         """The reference load is the column that the user names; a minus before it turns its sign."""
@@ -160,7 +161,7 @@ class _Assignment:
         if in_unit.quantity == "pressure":
             name = self.sheet.columns[found.index].name
             self.notes.append(f"Column {name} is a pressure: as the load it is taken for the force on 1 cm².")
-            found = Pick(found.index, on_one_cm2(in_unit))
+            found, self.is_pressed_all_over = Pick(found.index, on_one_cm2(in_unit)), True
         self.units[found.index] = need_quantity(self.sheet, found, "--force", "force", "N")
         self._take(found.index, "load")
 
@@ -172,9 +173,16 @@ class _Assignment:
             if found.index in self.chosen or found.index == at_time:
                 name = self.sheet.columns[found.index].name
                 raise InputError(f"{self.sheet.path}: column {name!r} is chosen twice: choose another for --sensor")
-            self.units[found.index] = need_unit(self.sheet, found, "--sensor", "mbar")
+            in_unit = need_unit(self.sheet, found, "--sensor", "mbar")
+            self.units[found.index] = in_unit
             self.roles[found.index] = "sensor"
             self.chosen.add(found.index)
+            if self.is_pressed_all_over and in_unit.quantity == "force":
+                name = self.sheet.columns[found.index].name
+                self.notes.append(
+                    f"Column {name}, a force, is the reading, and the load a pressure: exchange --force and --sensor if"
+                    " it is the other way round."
+                )
 
     def _take(self, index: int, role: Role) -> None:
         self.roles = [None if each == role else each for each in self.roles]

@@ -191,6 +191,13 @@ def test_a_pressure_as_the_reference_is_the_force_on_a_square_centimetre() -> No
     assert "1 cm²" in found.notes[-1]
 
 
+def test_a_force_that_is_read_beside_a_pressure_as_the_load_may_be_exchanged() -> None:
+    log = sheet("time|s", "tube|mbar", "Load|N", "film|V")
+    assert "exchange --force and --sensor" in recording_from(log, force="tube", sensors=["Load"]).notes[-1]
+    for force, sensor in (("tube", "film"), ("Load", "tube"), ("Load", "film")):
+        assert not any("exchange" in note for note in recording_from(log, force=force, sensors=[sensor]).notes)
+
+
 def test_a_choice_that_the_other_log_of_a_pair_holds_is_passed_over() -> None:
     choices = {"time": "row[50Hz]", "force": "chamber", "sensors": ["taxel"]}
     machine = recording_from(sheet("row|", "chamber|bar"), partly=True, **choices)
