@@ -158,7 +158,7 @@ def late_of(found: Compensation) -> list[str]:
     """What is said of latencies that are undone in part, since the rest would make too much of the noise."""
     return [
         f"the calibration leaves {1e3 * left_s:.3g} ms of the {in_words(name)}: undoing all of it would raise"
-        " fast noise too much, and where loads are quicker than those judged here the force is as late"
+        " fast noise too much, and where loads are quicker than those judged here the force is that late"
         for name, left_s in found.filter.lags_left_s.items()
     ]
 
@@ -180,9 +180,10 @@ def going_on_of(found: Compensation, named: Collection[str], thresholds: Thresho
 
 
 def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
-    """What is said where a calibration is clearly farther off than errors without a recording's own tell.
+    """What is said where a calibration is clearly farther off on a recording than the errors that are told.
 
-    It takes one zero for all recordings, that of what it undoes, and begins each as a unit that bore nothing before.
+    It takes one zero for all recordings, that of what it undoes, and begins each as a unit that bore nothing before;
+    these errors allow each its own, and are of what is held out, whose loads may ask less of it than others do.
     """
     model, there = found.model, [one for one in found.fine if one.usable.any()]
     scale_n = model.full_scale_load_n
