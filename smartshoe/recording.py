@@ -301,7 +301,7 @@ class Recording(Summarised):
         found = self.of_role("load")
         if not found:
             raise MissingChannelError(
-                f"{self.label} has no reference load; {self._named_by('--force', 'Load[N]', 'force_n')}"
+                f"{self.label} has no reference load; {self._named_by('--force', 'Load[N]', LOAD_NAME, 'n')}"
                 f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]
@@ -319,16 +319,15 @@ class Recording(Summarised):
             what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
             likely = next((one.name for one in found or self.of_role("auxiliary")), "")
             raise MissingChannelError(
-                f"{self.label} has {what}; {self._named_by('--sensor', likely, 'pressure_v')}"
+                f"{self.label} has {what}; {self._named_by('--sensor', likely, SENSOR_NAME, 'v')}"
                 f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]
 
-    def _named_by(self, option: str, column: str, array: str) -> str:
+    def _named_by(self, option: str, column: str, name: str, suffix: str) -> str:
         """How a person says which column is meant: of a file by an ``option``, of arrays by their names."""
         if not self.source:
-            name, unit_ = array.split("_")
-            return f"name its array {name}_ and its unit, for example {name}_{unit_}="
+            return f"name its array {name}_ and its unit, for example {name}_{suffix}="
         example = f", for example {option} '{column}'" if column else ""
         return f"name its column with {option}{example}"
 

@@ -97,11 +97,11 @@ class ExtendedCompensator(ForceFilter):
             self._cautions[part.name] = f"undoing it raises fast noise of the readings {raised:.3g} times"
             return
         limit = NoiseLimit(MOST / raised)
-        self._left_s[part.name] = limit.lag_steps * self.step_s
+        self._left_s[part.name] = left_s = limit.lag_steps * self.step_s
         self._blocks.append((f"{part.name}_limit", limit))
         self._cautions[part.name] = (
             f"undoing it would raise fast noise of the readings {raised:.3g} times: smoothed to {MOST:g} times, which"
-            f" leaves a lag of {1e3 * self._left_s[part.name]:.3g} ms"
+            f" leaves a lag of {1e3 * left_s:.3g} ms"
         )
 
     def _undo_core(self) -> None:

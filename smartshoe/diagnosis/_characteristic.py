@@ -33,6 +33,11 @@ class Branches:
         """(n,) the static characteristic: the mean of both branches."""
         return 0.5 * (self.ups + self.downs)
 
+    @property
+    def apart(self) -> float:
+        """By how much the reading lies higher while the load rises, the median over the load."""
+        return float(np.median(self.ups - self.downs))
+
 
 def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None:
     """The two branches; None where the load seldom passes the same place in both directions."""
@@ -85,11 +90,10 @@ def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
     """Whether the branches lie as far apart, the same way, in either half: those of what wanders are chance."""
     middle_s = 0.5 * float(recording.time_s[0] + recording.time_s[-1])
     ends_s = (float(recording.time_s[0]), middle_s, float(recording.time_s[-1]))
-    halves = [branches_of(recording.between(*span), thresholds) for span in pairwise(ends_s)]
-    if any(one is None for one in halves):
+    first, second = (branches_of(recording.between(*span), thresholds) for span in pairwise(ends_s))
+    if first is None or second is None:
         return False
-    first, second = (one.ups - one.downs for one in halves if one is not None)
-    lower, upper = sorted((float(np.median(first)), float(np.median(second))), key=abs)
+    lower, upper = sorted((first.apart, second.apart), key=abs)
     return lower * upper > 0.0 and abs(upper) < thresholds.clear * abs(lower)
 
 
@@ -97,7 +101,7 @@ def _friction(found: Branches, thresholds: Thresholds) -> str | None:
     if not _comes_back(found.recording, thresholds):
         return None
     sensor = found.recording.sensor
-    half = 0.5 * float(np.median(found.ups - found.downs))
+    half = 0.5 * found.apart
     return (
         f"the {sensor.name} of {found.recording.name} does not follow this load but its direction: while the load rises"
         f" it lies {abs(half):.3g} {sensor.unit.symbol} {'above' if half > 0 else 'below'} its mean, while it falls as"

@@ -262,5 +262,6 @@ def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: flo
             found.append(rate)
             reach = most
     alike = [sum(one / (1.0 + same) <= rate <= one * (1.0 + same) for rate, _ in rates) for one in found]
-    is_single = len(rates) - max(alike, default=0) == 1 and max(alike) >= (1.0 - same) * len(rates)
-    return [found[alike.index(max(alike))]] if is_single else found
+    largest = max(alike, default=0)
+    is_single = len(rates) - largest == 1 and largest >= (1.0 - same) * len(rates)
+    return [found[alike.index(largest)]] if is_single else found

@@ -81,9 +81,18 @@ def compensation(
     before, whole = force_error(fine, plain), force_error(fine, extended)
 
     def by_plain(rejected: ForceError | None = None) -> Compensation:
-        filter_ = _compensator(plain, fine[0])
-        errors = before, before, whole
-        return Compensation(fine, plain, *errors, filter_, extended.names, True, rejected, clipped)
+        return Compensation(
+            fine,
+            plain,
+            before,
+            before,
+            whole,
+            _compensator(plain, fine[0]),
+            passed_over=extended.names,
+            is_plain=True,
+            rejected=rejected,
+            clipped=clipped,
+        )
 
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n

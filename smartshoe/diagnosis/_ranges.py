@@ -28,7 +28,7 @@ class Ranges:
 def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> Ranges:
     """A sentence for each thing that the range of the fitted loads does not allow to be said."""
     said: list[str] = []
-    fitted = [one for one in sessions if one.fitted.sum() > 10]
+    fitted = [one for one in sessions if _tells(one.fitted)]
     if not fitted:
         return Ranges()
     kept = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
@@ -65,7 +65,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             " over its range)"
         )
     said += _flat_above(kept, scale, thresholds)
-    judged = [one for one in sessions if one.fitted.sum() <= 10 < one.judged.sum()]
+    judged = [one for one in sessions if not _tells(one.fitted) and _tells(one.judged)]
     beside = [_gain(one.conditions.load[one.judged], one.reading[one.judged], thresholds.follows) for one in judged]
     named = [one.recording.name for one in (*fitted, *judged)]
     said += _foreign(list(zip(named, (*within, *beside), strict=True)), thresholds)
@@ -83,6 +83,11 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 " zero of reading or load is another in each file, or the files are not of one unit"
             )
     return Ranges(tuple(said), trap)
+
+
+def _tells(seen: Mask) -> bool:
+    """Whether enough of a recording is ``seen`` (n,) to tell a gain."""
+    return int(seen.sum()) > 10
 
 
 def _flat_above(kept: Sequence[tuple[Array, Array]], scale: Scale, thresholds: Thresholds) -> list[str]:

@@ -13,19 +13,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
-from smartshoe.calibration import ExtendedCompensator
-from smartshoe.diagnosis import Thresholds, _force
+from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._force import (
-    Compensation,
-    ForceError,
     as_calibrated,
-    clipped_of,
     compensation,
-    force_error,
-    force_of,
-    going_on_of,
-    late_of,
-    not_undone_of,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
@@ -37,10 +28,9 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_no
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate
 from smartshoe.diagnosis._validation import extrapolating
-from smartshoe.diagnosis._zero import mean_offset, own_zeros
+from smartshoe.diagnosis._zero import own_zeros
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
-from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
@@ -155,155 +145,6 @@ def test_a_gains_interval_is_that_of_cycles_drawn_anew() -> None:
 
 def found_scale() -> Scale:
     return Scale(800.0, 140.0, MILLIBAR)
-
-
-def test_the_compensated_force_is_off_by_what_the_reading_is(one: Session) -> None:
-    everything = np.ones(one.reading.size, dtype=bool)
-    judged = replace(one, held_out=everything)
-    assert force_error([judged], MODEL).held_out_n == pytest.approx(0.0, abs=1e-3 * 800.0)
-    # A reading that is too large by a share makes a force that is so; its offset is the recording's own.
-    more = replace(judged, reading=1.02 * one.reading + 0.3)
-    rms = 0.02 * float(np.std(one.conditions.load)) * 800.0
-    assert force_error([more], MODEL).held_out_n == pytest.approx(rms, rel=0.1)
-    assert force_error([more, judged], MODEL).held_out_n == pytest.approx(rms / np.sqrt(2.0), rel=0.1)
-    fitted = force_error([one], MODEL)
-    assert (fitted.fitted_n, np.isnan(fitted.held_out_n)) == (pytest.approx(0.0, abs=1e-3 * 800.0), True)
-
-
-def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
-    """Its reading, an error of 8 % added, tells no load; a curve that bends a little still tells it."""
-    noise = 0.08 * np.random.default_rng(1).standard_normal(one.reading.size)
-    for slopes, is_run in ((np.linspace(0.0, -0.94, 6), False), (np.linspace(0.0, -0.3, 6), True)):
-        bent = MODEL.with_part("flexible_curve", slopes)
-        seen = replace(one, reading=bent.simulate(one.conditions) + noise)
-        found = compensation([seen], replace(bent, noise=0.08), MODEL, STANDARD)
-        assert found.model is MODEL or is_run
-        assert found.is_plain is not is_run
-        assert (found.before, found.whole) == tuple(force_error([seen], model) for model in (MODEL, bent))
-        said = force_of(found)
-        assert (said == []) is is_run
-        assert is_run or "compensates by the baseline, and its twin simulates with the effects" in said[0]
-
-
-def test_a_lag_is_not_undone_where_that_makes_more_of_the_noise_than_it_takes_off(one: Session) -> None:
-    """The curve beside it is; of less noise both are."""
-    bent = MODEL.with_part("gas_compression", np.array([0.4])).with_part("sensor_lag", np.array([0.1, 0.0]))
-    for noise, left in ((0.03, ("sensor_lag",)), (0.003, ())):
-        read = bent.simulate(one.conditions) + noise * np.random.default_rng(1).standard_normal(one.reading.size)
-        seen = replace(one, reading=read)
-        found = compensation([seen], replace(bent, noise=noise), MODEL, STANDARD)
-        assert found.passed_over == left
-        assert {*found.model.names} == {*bent.names} - {*left}
-        assert found.error.fitted_n == pytest.approx(force_error([seen], found.model).fitted_n)
-        assert found.error.fitted_n < found.before.fitted_n
-        said = force_of(found)
-        assert bool(said) is bool(left)
-        assert not left or said[0].startswith("the calibration does not undo sensor lag, which would make more of")
-
-
-@pytest.mark.parametrize(("held_out_n", "is_plain"), [(9.1, False), (9.3, True), (np.nan, False)])
-def test_a_force_that_is_worse_on_what_is_held_out_is_the_plain_models(
-    one: Session, monkeypatch: pytest.MonkeyPatch, held_out_n: float, is_plain: bool
-) -> None:
-    bent = MODEL.with_part("gas_compression", np.array([0.1]))
-    before, extended = ForceError(9.0, 9.0), ForceError(5.0, held_out_n)
-    monkeypatch.setattr(_force, "force_error", lambda _, model: extended if model.parts else before)
-    found = compensation([one], bent, MODEL, STANDARD)
-    assert found.is_plain is is_plain
-    assert found.model is (MODEL if is_plain else bent)
-    assert found.rejected == (extended if is_plain else None)
-    assert found.error == (before if is_plain else extended)
-    told = "baseline's on held-out data (9 to 9.3 N): the calibration compensates by the baseline"
-    assert (told in str(force_of(found))) is is_plain
-
-
-def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
-    """A linear unit that is clipped at 60 % was compensated by a line through its clipped samples."""
-    lost = effect("saturation").start({"level": 0.6, "knee": 0.002})
-    lost[0] = 1.0
-    clipped = MODEL.with_part("saturation", lost)
-    seen = replace(one, reading=clipped.simulate(one.conditions))
-    bent = replace(MODEL, gain=0.8 * MODEL.gain)  # a line through all of it
-    found = compensation([seen], clipped, bent, STANDARD)
-    assert not found.is_plain
-    assert found.error.fitted_n < 0.1 * found.before.fitted_n
-    assert force_error([seen], clipped).fitted_n > 10.0 * found.error.fitted_n  # with the clipped ones
-    (said,) = clipped_of(found)
-    lost_share = np.mean(np.abs(MODEL.simulate(one.conditions) - seen.reading) >= STANDARD.tolerable)
-    assert said.startswith(f"errors of the force leave out {100.0 * lost_share:.2g} % of samples")
-    assert clipped_of(compensation([one], MODEL, MODEL, STANDARD)) == []
-    # Nor do they move the zero: the filter does not undo the clipping, and with them it lies below.
-    assert found.zero == pytest.approx(0.0, abs=1e-4)
-    assert mean_offset([seen], found.undone) < -0.01
-
-
-@pytest.mark.parametrize(("more", "is_plain"), [(0.999, False), (1.001, True), (np.nan, True)])
-def test_a_force_that_is_hardly_worse_decides_nothing(
-    one: Session, monkeypatch: pytest.MonkeyPatch, more: float, is_plain: bool
-) -> None:
-    bent, most = MODEL.with_part("gas_compression", np.array([0.1])), 9.0 * (1.0 + STANDARD.standing)
-    errors = {len(MODEL.parts): ForceError(9.0, 9.0), len(bent.parts): ForceError(more * most, 8.0)}
-    monkeypatch.setattr(_force, "force_error", lambda fine, model: errors[len(model.parts)])
-    assert compensation([one], bent, MODEL, STANDARD).is_plain is is_plain
-
-
-def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
-    late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
-    (said,) = not_undone_of(late, 0.02)
-    late_by = "no compensator takes off the delay, since a stream of readings cannot be moved to another time"
-    assert said.startswith(late_by)
-    (said,) = not_undone_of(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
-    assert said.startswith("no compensator takes off the clock drift, since ")
-    assert not_undone_of(late.without("delay"), 0.02) == []
-
-
-def test_what_has_no_name_and_is_taken_off_by_the_clock_is_said_to_go_on(one: Session) -> None:
-    """0.00002 of full scale a second is 7.2 % in an hour, through the gain that follows it."""
-    drift = np.array([2e-5, 0.0, 0.0, 1.0])
-    drifting = MODEL.with_part("zero_drift", drift)
-
-    def told(model: ExtendedModel, *named: str) -> list[str]:
-        nothing = ForceError(0.0, 0.0)
-        undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
-        return going_on_of(Compensation([one], model, nothing, nothing, nothing, undone_by), named, STANDARD)
-
-    (said,) = told(drifting)
-    assert "(zero drift by -7.2 %)" in said
-    assert told(drifting, "zero_drift") == []  # a cause is told as one
-    assert told(MODEL.with_part("zero_drift", 0.2 * drift)) == []  # hardly anything
-    assert told(MODEL) == []
-
-
-def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Session) -> None:
-    """What is held out is slow: its figure is none for what was fitted."""
-    late = MODEL.with_part("sensor_lag", np.array([0.2, 0.3]))
-    nothing, few = ForceError(0.0, 0.0), ForceError(0.0, 0.1)
-    undone_by = ExtendedCompensator(late, 1.0 / one.conditions.step_s)
-    (left_s,) = undone_by.lags_left_s.values()
-    found = Compensation([one], late, nothing, nothing, nothing, undone_by)
-    (said,) = late_of(found)
-    assert said.startswith(f"the calibration leaves {1e3 * left_s:.3g} ms of the sensor lag")
-    assert late_of(replace(found, filter=ExtendedCompensator(MODEL, 1.0 / one.conditions.step_s))) == []
-    quick = replace(one, reading=late.simulate(one.conditions))
-    found = replace(found, fine=[quick], error=few)
-    (said,) = as_calibrated(found, STANDARD)
-    off_n = force_error([quick], late).fitted_n
-    assert off_n > STANDARD.clear * STANDARD.tolerable * late.full_scale_load_n
-    assert said.startswith(
-        f"the force of {one.recording.name} is off by {off_n:.2g} N (rms), that of what is held out by 0.1"
-    )
-    for held_n in (off_n / STANDARD.clear * 1.01, np.nan):  # nearly as far off as what is held out, or none is
-        assert as_calibrated(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
-
-
-def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
-    late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
-    nothing = ForceError(0.0, 0.0)
-    for model, names in ((late, ("dead_band",)), (MODEL, ())):
-        undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
-        found = Compensation([one], model, nothing, nothing, nothing, undone_by)
-        assert found.undone.names == names
-    assert found.undone is MODEL
 
 
 def test_an_effect_that_is_far_larger_in_what_was_not_fitted_is_beyond_knowledge(one: Session) -> None:

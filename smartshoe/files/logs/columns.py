@@ -170,15 +170,14 @@ class _Assignment:
         self.roles = [None if role == "sensor" else role for role in self.roles]
         for choice in sensors:
             found = pick(self.sheet, choice, "--sensor")
+            name = self.sheet.columns[found.index].name
             if found.index in self.chosen or found.index == at_time:
-                name = self.sheet.columns[found.index].name
                 raise InputError(f"{self.sheet.path}: column {name!r} is chosen twice: choose another for --sensor")
             in_unit = need_unit(self.sheet, found, "--sensor", "mbar")
             self.units[found.index] = in_unit
             self.roles[found.index] = "sensor"
             self.chosen.add(found.index)
             if self.is_pressed_all_over and in_unit.quantity == "force":
-                name = self.sheet.columns[found.index].name
                 self.notes.append(
                     f"Column {name}, a force, is the reading, and the load a pressure: exchange --force and --sensor if"
                     " it is the other way round."
