@@ -39,23 +39,49 @@ class Branches:
         return float(np.median(self.ups - self.downs))
 
 
-def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None:
-    """The two branches; None where the load seldom passes the same place in both directions."""
+@dataclass(frozen=True, eq=False)
+class _Strokes:
+    """``load`` and ``reading`` (n,) where both are there; ``rate`` (n,), of the load, to a scale of its own."""
+
+    load: Array
+    reading: Array
+    rate: Array
+    still: float
+
+    def explained_by(self, place: Array, ups: Array, downs: Array) -> float:
+        """Share of the variance of what moves that two branches over ``place`` explain, each (bins,)."""
+        moves = np.abs(self.rate) > self.still
+        along = [np.interp(self.load[moves], place, branch) for branch in (ups, downs)]
+        return _explained(self.reading[moves], np.where(self.rate[moves] > 0.0, *along))
+
+
+def _strokes_of(recording: Recording, thresholds: Thresholds) -> _Strokes | None:
     if not recording.of_role("load") or len(recording.sensors) != 1:
         return None
     load, sensor = recording.load, recording.sensor
     present = load.present & sensor.present
     x, y = load.values[present], sensor.values[present]
+    if x.size < thresholds.least_samples or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return None
     width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
-    if x.size < max(thresholds.least_samples, width) or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+    if x.size < width:
         return None
     rate = np.gradient(np.convolve(x, np.ones(width), "same"))  # to one scale: it is held against its own largest
-    low, high = (float(value) for value in np.percentile(x, [1, 99]))
     still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
+    return _Strokes(x, y, rate, still)
+
+
+def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None:
+    """The two branches; None where the load seldom passes the same place in both directions."""
+    strokes = _strokes_of(recording, thresholds)
+    if strokes is None:
+        return None
+    x, y, rate = strokes.load, strokes.reading, strokes.rate
+    low, high = (float(value) for value in np.percentile(x, [1, 99]))
     # Rice's rule, of each direction's half.
     bins = 2 * round((0.5 * x.size) ** (1.0 / 3.0))
     edges = np.linspace(low, high, bins + 1)
-    rises, falls = (_by_bin(x[moves], y[moves], edges) for moves in (rate > still, rate < -still))
+    rises, falls = (_by_bin(x[moves], y[moves], edges) for moves in (rate > strokes.still, rate < -strokes.still))
     at, ups, downs = [], [], []
     for left, right, up, down in zip(edges[:-1], edges[1:], rises, falls, strict=True):
         if min(up.size, down.size) > 2:
@@ -65,10 +91,8 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
     if len(at) < bins // 2:
         return None
     place, rising, falling = np.array(at), np.array(ups), np.array(downs)
-    moving = np.abs(rate) > still
-    either = np.where(rate > 0, np.interp(x, place, rising), np.interp(x, place, falling))
     by_curve = _explained(y, np.interp(x, place, 0.5 * (rising + falling)))
-    return Branches(recording, place, rising, falling, by_curve, _explained(y[moving], either[moving]))
+    return Branches(recording, place, rising, falling, by_curve, strokes.explained_by(place, rising, falling))
 
 
 def _by_bin(x: Array, y: Array, edges: Array) -> list[Array]:
@@ -87,14 +111,17 @@ def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:
 
 
 def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
-    """Whether the branches lie as far apart, the same way, in either half: those of what wanders are chance."""
+    """Whether the branches of either half explain the other half: those of what wanders are chance."""
     middle_s = 0.5 * float(recording.time_s[0] + recording.time_s[-1])
     ends_s = (float(recording.time_s[0]), middle_s, float(recording.time_s[-1]))
-    first, second = (branches_of(recording.between(*span), thresholds) for span in pairwise(ends_s))
-    if first is None or second is None:
-        return False
-    lower, upper = sorted((first.apart, second.apart), key=abs)
-    return lower * upper > 0.0 and abs(upper) < thresholds.clear * abs(lower)
+    halves = [recording.between(*span) for span in pairwise(ends_s)]
+    for half, other in (halves, reversed(halves)):
+        found, strokes = branches_of(half, thresholds), _strokes_of(other, thresholds)
+        if found is None or strokes is None:
+            return False
+        if strokes.explained_by(found.place, found.ups, found.downs) < thresholds.follows:
+            return False
+    return True
 
 
 def _friction(found: Branches, thresholds: Thresholds) -> str | None:

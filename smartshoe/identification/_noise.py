@@ -11,7 +11,7 @@ from smartshoe.identification._experiment import Experiment
 from smartshoe.identification._prediction_error import EVERY, NONE, NOT_STORED, PredictionError
 from smartshoe.identification._solve import solve_normal
 from smartshoe.models.first_order import interpolation_gain
-from smartshoe.signals.noise import UNIFORM_SD, white_noise_sd
+from smartshoe.signals.noise import white_noise_sd
 
 MATTERS = 0.1  # of a standard error: a smaller bias is not worth another estimator
 DIFFERENCES = 4000  # third differences looked at
@@ -25,14 +25,11 @@ def noise_sds(experiments: Sequence[Experiment]) -> tuple[float, float]:
 
 
 def _noise_sd(signals: Sequence[Array]) -> float:
-    """Of ``signals`` (n,): what scatters, or where a converter's step hides that, what the step leaves.
-
-    Where values come back they are levels, and the step is the usual distance between neighbours.
-    """
-    scatter = white_noise_sd(*signals, order=3, most=DIFFERENCES)
+    """Of ``signals`` (n,); where values come back they are levels, a step the usual distance between neighbours."""
     levels = [np.unique(one) for one in signals]
     steps = [np.diff(own) for one, own in zip(signals, levels, strict=True) if 2 <= own.size <= one.size // 2]
-    return max(scatter, UNIFORM_SD * float(np.median(np.concatenate(steps)))) if steps else scatter
+    step = float(np.median(np.concatenate(steps))) if steps else 0.0
+    return white_noise_sd(*signals, order=3, most=DIFFERENCES, step=step)
 
 
 def input_noise_bias(problem: PredictionError, theta: Array, normal: Array, input_sd: float) -> Array:

@@ -12,6 +12,7 @@ from smartshoe.arrays import Array
 NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal law
 NORMAL_QUARTILE = 0.6744897501960817  # and the half of it: the median of the absolute value
 MAINS_HZ = (50.0, 60.0)
+WILD = 4.0  # standard deviations, beyond which one of 16,000 is noise
 UNIFORM_SD = 1.0 / math.sqrt(12.0)  # of what is anywhere within one step: a rounded value, a time in its interval
 
 
@@ -29,17 +30,27 @@ def robust_sd(deviations: Array) -> float:
     return float(median) / NORMAL_QUARTILE
 
 
-def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None) -> float:
+def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None, step: float = 0.0) -> float:
     """Standard deviation of the white noise on smooth ``signals`` (n,), by the median of their differences.
 
     Second differences (``order``) take off a straight line, third ones a bend; corners are few and do not move a
-    median. Of more than ``most`` differences so many are looked at. A noise below a converter's step is not seen (the
-    median is 0): what a step leaves is the step's own, step/sqrt(12). 0 where signals are too short.
+    median. Of more than ``most`` differences so many are looked at. A converter's ``step`` adds its own, step/sqrt(12),
+    and hides what is smaller: of whole steps the median is one too, and leaves half a step open to either side, so that
+    the mean square decides, without what is wild or a corner. 0 where signals are too short.
     """
     share = max(sum(signal.size for signal in signals) // most, 1) if most else 1
     found = [_differences(signal, order, share) for signal in signals if signal.size > order + 1]
     power = math.comb(2 * order, order)  # the sum of the squares of the difference's weights
-    return robust_sd(np.concatenate(found)) / math.sqrt(power) if found else 0.0
+    if not found:
+        return 0.0
+    differences, scale = np.concatenate(found), 1.0 / math.sqrt(power)
+    sd = scale * robust_sd(differences)
+    if step == 0.0:
+        return sd
+    own, left_open = UNIFORM_SD * step, 0.5 * scale * step / NORMAL_QUARTILE
+    most_of_noise = WILD * math.hypot(own, sd + left_open) / scale
+    within = differences[np.abs(differences) <= most_of_noise]
+    return max(own, scale * float(np.sqrt(np.mean(within**2))))
 
 
 def _differences(signal: Array, order: int, share: int) -> Array:

@@ -150,6 +150,19 @@ def test_only_friction_is_told_as_friction() -> None:
     assert "friction" in str(told(np.where(TIME_S < 30.0, 1.0, 0.6) * 5.0 * _rising()))
 
 
+@given(noise=st.floats(0.0, 2.0), drift=st.floats(-10.0, 10.0), cycles=st.integers(2, 12), seed=st.integers(0, 1000))
+@settings(max_examples=25)
+def test_friction_is_told_through_noise_and_a_zero_that_drifts(
+    noise: float, drift: float, cycles: int, seed: int
+) -> None:
+    phase = np.linspace(0.0, cycles, TIME_S.size, endpoint=False) % 1.0
+    load = 100.0 * (1.0 - 2.0 * np.abs(2.0 * phase - 1.0))
+    reading = 5.0 * np.sign(0.5 - phase) + drift * TIME_S / TIME_S[-1]
+    reading += noise * np.random.default_rng(seed).standard_normal(TIME_S.size)
+    said = friction_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading), STANDARD)
+    assert "its direction" in str(said)
+
+
 def test_what_wanders_is_seldom_told_as_friction() -> None:
     """The branches of a random walk explain some of it over two load cycles, and are others in the second."""
     slow = 100.0 * (2.0 * np.abs(2.0 * (TIME_S / 30.0 % 1.0) - 1.0) - 1.0)
@@ -162,7 +175,7 @@ def test_what_wanders_is_seldom_told_as_friction() -> None:
         by_whole += found.by_branch >= STANDARD.follows > found.by_curve
         told += friction_of(made, STANDARD) is not None
     assert by_whole >= 12
-    assert told <= by_whole / 2
+    assert told <= by_whole / 5
 
 
 @given(power=st.floats(0.8, 1.2), floor_s=st.floats(1e-5, 1e-3), seed=st.integers(0, 1000))

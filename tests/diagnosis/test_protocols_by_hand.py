@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -228,6 +229,33 @@ def test_one_stray_ramp_makes_no_second_rate_and_several_do(strays: tuple[float,
     many = [(1.0, 10_000)] * 20
     assert len(_distinct_rates([*many, *((rate, 10_000) for rate in strays)], 0.25)) == count
     assert len(_distinct_rates([*many[:2], *((rate, 10_000) for rate in strays)], 0.25)) == len({*strays}) + 1
+
+
+RAMPS = st.lists(st.tuples(st.floats(0.01, 10.0), st.floats(1.0, 1000.0)), min_size=1, max_size=12)
+
+
+@given(ramps=RAMPS, scale=st.sampled_from([2.0**-10, 0.5, 4.0, 2.0**20]), order=st.randoms(use_true_random=False))
+def test_rates_are_the_same_in_any_order_and_any_unit_of_time(
+    ramps: list[tuple[float, float]], scale: float, order: Any
+) -> None:
+    found = _distinct_rates(ramps, 0.25)
+    assert set(found) <= {rate for rate, _ in ramps}
+    assert all(later > 1.25 * earlier for earlier, later in pairwise(sorted(found)))
+    shuffled = order.sample(ramps, len(ramps))
+    assert _distinct_rates(shuffled, 0.25) == found
+    assert _distinct_rates([(scale * rate, samples) for rate, samples in ramps], 0.25) == [scale * one for one in found]
+
+
+@given(
+    steps=st.lists(st.floats(1.3, 10.0), min_size=1, max_size=5), repeats=st.integers(2, 5), ends=st.floats(1.0, 2.0),
+    short=st.lists(st.floats(0.01, 100.0), max_size=4),
+)  # fmt: skip
+def test_rates_of_long_ramps_are_all_found_and_ramps_of_a_sample_or_two_hide_none(
+    steps: list[float], repeats: int, ends: float, short: list[float]
+) -> None:
+    rates = list(np.cumprod(steps))
+    found = _distinct_rates([(rate, 1000.0) for rate in rates] * repeats + [(one, 2.0) for one in short], 0.25, ends)
+    assert all(any(one == pytest.approx(rate, rel=0.25) for one in found) for rate in rates)
 
 
 def test_rates_of_short_ramps_differ_by_more_than_two_samples_at_either_end() -> None:
