@@ -18,14 +18,22 @@ Integers = NDArray[np.int64]
 def numbers_of(values: ArrayLike, what: str) -> Array:
     """``values`` as real numbers, not copied where they are; raises `InputError` naming ``what`` where they are none.
 
-    None counts as NaN, as in a table read elsewhere.
+    None among them counts as NaN, as in a table read elsewhere.
     """
     try:
-        kind = getattr(getattr(values, "dtype", None), "kind", None) or np.asarray(values).dtype.kind
-        if kind == "c":  # numpy would drop the imaginary part
+        given = values if hasattr(values, "dtype") else np.asarray(values)
+        kinds = {given.dtype.kind}
+        if "O" in kinds:
+            of_each_type = {type(one): one for one in np.ravel(given) if one is not None}
+            kinds = {np.asarray(one).dtype.kind for one in of_each_type.values()}
+        if "c" in kinds:  # numpy would drop the imaginary part
             raise TypeError("complex numbers")
-        if kind in "mM":  # numpy would count nanoseconds, or days
+        if kinds & set("mM"):  # numpy would count nanoseconds, or days
             raise TypeError("dates or durations: seconds are (t - t[0]) / numpy.timedelta64(1, 's')")
+        if kinds & set("SU"):  # numpy would read it
+            raise TypeError("text")
+        if values is None:
+            raise TypeError("None")
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what}: not all are real numbers ({error}): give these, NaN where one is missing") from error

@@ -35,6 +35,9 @@ class CompensatorBank:
         self._bank = np.array([_column(item) for item in self.filters]).T.copy()
         self.reset()
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self)} filters at {self.filters[0].sample_rate_hz:g} Hz>"
+
     def __len__(self) -> int:
         return len(self.filters)
 

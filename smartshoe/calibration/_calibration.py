@@ -65,6 +65,8 @@ class Calibration:
     twin: ExtendedModel | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.unit, str):
+            raise InputError(f"the calibration's unit is {self.unit!r}: give the unit's name as text")
         for key in ("a1", "b0", "b1", "offset", "scale", "delay_s", "sample_rate_hz"):
             number = getattr(self, key)
             if not (isinstance(number, numbers.Real) and math.isfinite(number)):

@@ -37,6 +37,10 @@ class ForceFilter(ABC):
     def _advance(self, readings: Array, count: int) -> Array:
         """Force (n,) of finite ``readings`` (n,), the first of which is number ``count`` since `reset`."""
 
+    def __repr__(self) -> str:
+        of = "" if self.reading_unit is None else f" of readings in {self.reading_unit.symbol}"
+        return f"<{type(self).__name__} at {self.sample_rate_hz:g} Hz{of}>"
+
     def reset(self) -> None:
         """Forget the past: start in the steady state of the next reading."""
         self._last: float | None = None

@@ -252,6 +252,19 @@ class Diagnosis(Summarised):
         """``limits``, but for those that say which recordings were ``left_out``."""
         return self.limits[len(self.left_out) :]
 
+    @property
+    def minor_in_words(self) -> str:
+        """The effects of the extended model, adopted or rejected, that are no causes; empty where there are none."""
+        return listed(sorted(map(in_words, self.minor)), "and")
+
+    @property
+    def says_of_minor(self) -> str | None:
+        """The same as a sentence."""
+        if not self.minor:
+            return None
+        which = "extended" if self.rejected is None else "rejected"
+        return f"in the {which} model without being causes, too small or too unsure for a name: {self.minor_in_words}"
+
     def calibration(self, *, unit: str = "", sample_rate_hz: float | None = None, created: str = "") -> Calibration:
         """The extended model as a calibration, for `compensate`, `export` and a twin.
 
@@ -317,6 +330,7 @@ class Diagnosis(Summarised):
                     f"fault of the data: {in_words(fault.kind)}, {fault.label}: {fault.says}"
                     for fault in self.data_faults
                 ),
+                *([said] if (said := self.says_of_minor) else []),
                 *([f"what is left: {self.leftover}"] if self.leftover else []),
                 *(f"limit: {limit}" for limit in self.limits),
                 *([f"next: {self.next_experiment.says}"] if self.next_experiment else []),

@@ -63,6 +63,15 @@ def test_a_recording_at_another_rate_is_refused_and_its_own_named(by: float, is_
         assert filter_.apply(walk) == pytest.approx(filter_.apply(np.sin(time_s)))
 
 
+def test_what_is_no_reading_is_refused_and_leaves_the_stream_alone() -> None:
+    one, other = Compensator(0.2, 5.0, 1.0), Compensator(0.2, 5.0, 1.0)
+    for wrong in (None, "1", b"1", 1j, np.timedelta64(3, "s"), ["1", "2"]):
+        with pytest.raises(InputError, match="readings: not all are real numbers"):
+            one.push(wrong)  # type: ignore[call-overload]
+    assert one.push([1.0, None]).tolist() == other.push(np.array([1.0, np.nan])).tolist()  # type: ignore[call-overload]
+    assert (one.missing_count, one.push(2.0)) == (1, other.push(2.0))
+
+
 def test_apply_leaves_the_stream_alone() -> None:
     one, other = Compensator(A1, B0, B1), Compensator(A1, B0, B1)
     first = one.push(np.array([1.0, 2.0]))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from smartshoe.calibration import Compensator, stack
 from smartshoe.errors import InputError, UsageError
+from smartshoe.units import MILLIBAR
 
 
 def some_filters(units: int) -> list[Compensator]:
@@ -64,6 +65,13 @@ def test_any_kind_of_array_gives_the_same_forces(kind: str, with_out: bool, ndim
 
 def test_a_bank_is_as_long_as_its_filters_are_many() -> None:
     assert [len(stack([Compensator(0.2, 5.0, 1.0)] * units)) for units in (1, 4)] == [1, 4]
+
+
+def test_a_filter_and_a_bank_say_what_they_are() -> None:
+    assert repr(stack(some_filters(2))) == "<CompensatorBank of 2 filters at 100 Hz>"
+    assert repr(Compensator(0.2, 5.0, 1.0, sample_rate_hz=50.0)) == "<Compensator at 50 Hz>"
+    of_pressure = Compensator(0.2, 5.0, 1.0, reading_unit=MILLIBAR)
+    assert repr(of_pressure) == "<Compensator at 100 Hz of readings in mbar>"
 
 
 def test_a_returned_array_is_never_written_to_again() -> None:

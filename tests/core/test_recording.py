@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -54,7 +55,15 @@ def test_time_that_does_not_increase_is_refused(time_s: list[float], says: str) 
         np.arange(3).astype("timedelta64[ms]"),
         [np.datetime64(k, "s") for k in range(3)],
         np.arange(3) * 1j,
+        [np.timedelta64(1, "s"), np.timedelta64(2, "s"), None],
+        [datetime(2026, 5, 1), datetime(2026, 5, 2), 3.0],
+        np.array([1.0, 2.0 + 1.0j, 3.0], dtype=object),
+        np.array([1.0, np.complex128(2.0), 3.0], dtype=object),
         ["a", "b", "c"],
+        ["1", "2", "3"],
+        [1.0, b"2", 3.0],
+        np.array([1.0, "2", None], dtype=object),
+        None,
     ],
 )
 def test_time_that_is_no_number_of_seconds_is_refused(time_s: object) -> None:

@@ -11,7 +11,7 @@ import pytest
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, NextExperiment, Rival, Statement, Trace
-from smartshoe.errors import NotIdentifiableError
+from smartshoe.errors import InputError, NotIdentifiableError
 from smartshoe.integrity import DataFault
 from smartshoe.models import Parameter
 from smartshoe.models.effects import effect
@@ -143,10 +143,17 @@ def test_a_summary_tells_what_the_command_tells_beside_the_causes() -> None:
     told = replace(FOUND, data_faults=(hum,), leftover="a third lies in holds", next_experiment=repeat).summary()
     for line in (
         "fault of the data: held samples, run_1.csv: three samples in ten are held",
+        "in the extended model without being causes, too small or too unsure for a name: hum",
         "what is left: a third lies in holds",
         *(f"limit: {limit}" for limit in FOUND.limits),
         "next: repeat the load cycle",
     ):
         assert line in told.splitlines()
-    bare = replace(FOUND, data_faults=(), leftover=None, next_experiment=None, limits=()).summary()
-    assert not any(word in bare for word in ("fault of", "what is left", "limit: ", "next: "))
+    assert "in the rejected model without being causes" in replace(FOUND, rejected=FOUND.model).summary()
+    bare = replace(FOUND, data_faults=(), leftover=None, next_experiment=None, limits=(), minor=()).summary()
+    assert not any(word in bare for word in ("fault of", "without being", "what is left", "limit: ", "next: "))
+
+
+def test_the_unit_of_a_calibration_is_text() -> None:
+    with pytest.raises(InputError, match="unit is 5: give the unit's name as text"):
+        FOUND.calibration(unit=5)  # type: ignore[arg-type]

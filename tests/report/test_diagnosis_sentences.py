@@ -35,7 +35,6 @@ from smartshoe.report.diagnosis._sentences import (
     shares,
     shares_text,
     two_numbers,
-    unnamed,
     what_is_left,
     what_was_gained,
     why_this_one,
@@ -167,9 +166,9 @@ def test_the_forces_error_is_said_to_be_of_samples_that_are_not_clipped() -> Non
 
 def test_effects_without_a_name_are_told_and_free_forms_as_such() -> None:
     made = case("one cause")
-    assert unnamed(made) == ""
-    assert unnamed(replace(made, minor=("sensor_lag",))) == "sensor lag"
-    assert unnamed(replace(made, minor=("sensor_lag", "flexible_curve", "delay"))) == (
+    assert made.minor_in_words == ""
+    assert replace(made, minor=("sensor_lag",)).minor_in_words == "sensor lag"
+    assert replace(made, minor=("sensor_lag", "flexible_curve", "delay")).minor_in_words == (
         "curve of free form, delay and sensor lag"
     )
 

@@ -66,7 +66,7 @@ def write_diagnosis_page(
         "on_causes": " ".join(sentences.on_causes(diagnosis)),
         "likelihood": sentences.LIKELIHOOD,
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
-        "minor": sentences.unnamed(diagnosis),
+        "minor": diagnosis.minor_in_words,
         "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
         "named": in_words,
         "is_changed": any(map(charts.differs, diagnosis.traces)),

@@ -74,11 +74,6 @@ def how_sure(cause: Cause) -> str:
     )
 
 
-def unnamed(diagnosis: Diagnosis) -> str:
-    """The effects of the extended model, adopted or rejected, that are no causes."""
-    return listed(sorted(map(in_words, diagnosis.minor)), "and")
-
-
 def is_free_form(cause: Cause) -> bool:
     """Whether the numbers of a cause are those of a free form, since no equation of its kind fits well enough."""
     return cause.part is not None and not {one.name for one in cause.effect.parameters}.issuperset(cause.parameters)
@@ -271,7 +266,7 @@ def _but_for_clipped(diagnosis: Diagnosis) -> str:
 
 def what_was_gained(diagnosis: Diagnosis) -> str:
     """What was added to the baseline, and by how much the error on held-out data is lower, or higher, for it."""
-    names, others = [in_words(cause.name) for cause in diagnosis.causes], unnamed(diagnosis)
+    names, others = [in_words(cause.name) for cause in diagnosis.causes], diagnosis.minor_in_words
     if not (names or others):
         return "Nothing was added."
     without = [f"without a name: {others}"] if others else []

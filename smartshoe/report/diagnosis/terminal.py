@@ -26,7 +26,6 @@ from smartshoe.report.diagnosis._sentences import (
     on_causes,
     parameter_text,
     shares_text,
-    unnamed,
     what_is_left,
     why_this_one,
 )
@@ -46,12 +45,8 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
         _line(console, text)
     if diagnosis.causes:
         _causes(console, diagnosis)
-    if diagnosis.minor:
-        which = "extended" if diagnosis.rejected is None else "rejected"
-        _line(
-            console,
-            f"in the {which} model without being causes, too small or too unsure for a name: {unnamed(diagnosis)}",
-        )
+    if said_of_minor := diagnosis.says_of_minor:
+        _line(console, said_of_minor)
     if diagnosis.leftover:
         _line(console, what_is_left(diagnosis))
     rows = comparison(diagnosis)
