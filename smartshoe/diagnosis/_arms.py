@@ -29,16 +29,16 @@ def with_another_pole(state: State) -> State:
     return state_at(min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost))
 
 
-def with_a_latency(state: State) -> State:
+def late_beside_usual_arm(state: State) -> Fit:
     """The best of fits of the effects that delay a reading, each beside an arm as units have.
 
-    An arm that has come to its bounds is a lag's imitation, about which no lag is found.
+    The plain model's arm imitates a lag: it comes to its bounds, or stays within them, and no lag is found about it.
     """
     likelihood = state.likelihood()
     bare = with_usual_arm(state.fit.model)
     effects = available(likelihood.sessions, state.thresholds)
     late = [one for one in effects if one.is_latency and one.name not in bare.names]
-    return state_at(min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost))
+    return min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost)
 
 
 def with_a_usual_arm(state: State) -> State:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import (
-    with_a_latency,
+    late_beside_usual_arm,
     with_a_usual_arm,
     with_an_arm_that_creeps,
     with_another_pole,
@@ -35,7 +35,7 @@ from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
 from smartshoe.diagnosis._settling import Progress, better_from, better_from_one, law_or_block, settled, simpler
-from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
+from smartshoe.diagnosis._state import State, evidence_about, searched, state_at, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import listed
@@ -84,7 +84,7 @@ def infer(
         return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), is_valid)
     begun = State(evidence, best, plain)
     if is_stretched(plain.model):
-        begun = simpler(with_a_latency(begun), begun)
+        begun = simpler(state_at(late_beside_usual_arm(begun)), begun)
     state = _sought(begun, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")

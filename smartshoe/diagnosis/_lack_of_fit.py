@@ -64,13 +64,13 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
     power = variance = covered = 0.0
     pairs = 0
     for rows, share in repeats(sessions, residuals, thresholds.cycle):
-        count = rows.shape[0]
+        count, places = rows.shape
         pair_count = count * (count - 1) // 2
         # Over all pairs, products add up to the sum's square less the squares.
-        mean = (float(np.sum(rows.sum(axis=0) ** 2)) - float(np.sum(rows**2))) / (2 * pair_count * PLACES)
+        mean = (float(np.sum(rows.sum(axis=0) ** 2)) - float(np.sum(rows**2))) / (2 * pair_count * places)
         # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
-        spectrum = np.sum(np.abs(np.fft.rfft(rows - rows.mean(axis=0), 2 * PLACES, axis=1)) ** 2, axis=0)
-        auto = np.fft.irfft(spectrum, 2 * PLACES)[:PLACES] / (PLACES * (count - 1))
+        spectrum = np.sum(np.abs(np.fft.rfft(rows - rows.mean(axis=0), 2 * places, axis=1)) ** 2, axis=0)
+        auto = np.fft.irfft(spectrum, 2 * places)[:places] / (places * (count - 1))
         fewer = 1 - np.arange(1, auto.size) / auto.size
         spread = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
         power += share * mean
@@ -84,8 +84,9 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
 
 
 def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: float) -> list[tuple[Array, float]]:
-    """The residual over each kind of load cycle that comes back: (repeats, PLACES), while the unit is loaded.
+    """The residual over each kind of load cycle that comes back, (repeats, places), and over the rest after it.
 
+    `PLACES` while the unit is loaded, and as many a second at rest, for as long as it rests after each of the kind.
     Cycles of a kind differ by a share ``alike`` at most, in height, duration and course: random loads of one height
     repeat nothing. And the share of all samples that are within cycles of the kind: elsewhere nothing tells what
     repeats.
@@ -98,19 +99,22 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
         low, tall = float(load.min()), 0.1 * float(np.ptp(load))
         starts = np.flatnonzero(np.diff(session.cycle, prepend=-1))
         for start, part in zip(starts, np.split(load, starts[1:]), strict=True):
+            stop = int(start) + part.size
             peak = float(part.max())
             inside = np.flatnonzero(part > low + 0.1 * (peak - low)) if peak - low > tall else np.zeros(0, dtype=int)
             if inside.size < 8:
                 continue
             first, last = int(start + inside[0]), int(start + inside[-1])
-            usable = np.flatnonzero(session.usable[first : last + 1])
-            if usable.size < 0.9 * (last + 1 - first):
+            usable = np.flatnonzero(session.usable[first:stop])
+            loaded = int(np.searchsorted(usable, last + 1 - first))
+            if loaded < 0.9 * (last + 1 - first):
                 continue
-            places = np.linspace(0, last - first, PLACES)
             # A reading at its rail is as wrong each time: of what is masked nothing is left over.
-            row = np.interp(places, usable, residual[first + usable])
-            course = np.interp(places, usable, load[first + usable])
-            found.append(_LoadCycle(peak, (last - first) * session.conditions.step_s, course, row, last + 1 - first))
+            there, step_s = first + usable, session.conditions.step_s
+            course = np.interp(np.linspace(0, last - first, PLACES), usable[:loaded], load[there[:loaded]])
+            rest_s = (stop - 1 - last) * step_s if usable.size - loaded >= 0.9 * (stop - 1 - last) else 0.0
+            time_s = np.asarray(usable * step_s, dtype=np.float64)
+            found.append(_LoadCycle(peak, course, step_s, last + 1 - first, time_s, residual[there], rest_s))
     kinds: list[list[_LoadCycle]] = []
     for one in found:
         for kind in kinds:
@@ -119,21 +123,40 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
                 break
         else:
             kinds.append([one])
-    return [
-        (np.stack([one.residual for one in kind]), sum(one.size for one in kind) / total)
-        for kind in kinds
-        if len(kind) > 1
-    ]
+    return [_laid_over(kind, total) for kind in kinds if len(kind) > 1]
+
+
+def _laid_over(kind: Sequence[_LoadCycle], total: int) -> tuple[Array, float]:
+    """The rows of cycles of a kind, and their share of ``total`` samples."""
+    rest_s = min(one.rest_s for one in kind)
+    at_rest = round(PLACES * rest_s / kind[0].duration_s)
+    share = sum(one.size + rest_s / one.step_s for one in kind) / total
+    return np.stack([one.row(rest_s, at_rest) for one in kind]), share
 
 
 class _LoadCycle(NamedTuple):
-    """``peak`` load and ``duration_s`` of what is clear of rest; its ``course`` and the ``residual`` at `PLACES`."""
+    """``peak`` load and ``course`` (PLACES,) of the ``size`` samples that are clear of rest; ``rest_s`` that follows.
+
+    ``residual`` (n,) at ``time_s`` (n,) from where it is clear of rest.
+    """
 
     peak: float
-    duration_s: float
     course: Array
-    residual: Array
+    step_s: float
     size: int
+    time_s: Array
+    residual: Array
+    rest_s: float
+
+    @property
+    def duration_s(self) -> float:
+        return (self.size - 1) * self.step_s
+
+    def row(self, rest_s: float, at_rest: int) -> Array:
+        """The residual at `PLACES` while loaded and ``at_rest`` more over ``rest_s``."""
+        loaded_s = np.linspace(0.0, self.duration_s, PLACES)
+        at_rest_s = self.duration_s + np.linspace(0.0, rest_s, at_rest + 1)[1:]
+        return np.asarray(np.interp(np.concatenate([loaded_s, at_rest_s]), self.time_s, self.residual))
 
     def is_like(self, other: _LoadCycle, alike: float) -> bool:
         """Whether it differs from another by a share ``alike`` at most."""

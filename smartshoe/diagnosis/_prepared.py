@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._aligned import aligned, as_they_follow
+from smartshoe.diagnosis._aligned import Aligned, aligned, as_they_follow
 from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
-from smartshoe.diagnosis._scale import Scale, full_scale, thinning
+from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
 from smartshoe.diagnosis._session import Session, at_full_rate, prepare
+from smartshoe.display import first_names
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
@@ -52,6 +53,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds, following)
     held = held_out if any(held_out) else None
     factors = thinning(clocks.recordings[:count], scale, thresholds)
+    clocks, said_of_length = _first_parts(clocks, fitted_lengths(clocks.recordings[:count], factors))
     sessions = [
         replace(one, index=clocks.places[one.index])
         for one in prepare(clocks.recordings, clocks.usable, held, scale, factors, thresholds)
@@ -67,6 +69,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     limits = [
         *said_of_neighbours,
         *clocks.says,
+        *said_of_length,
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
         *excitation.limits(),
@@ -75,3 +78,20 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
     return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)
+
+
+def _first_parts(clocks: Aligned, lengths: Sequence[int]) -> tuple[Aligned, list[str]]:
+    """``clocks`` with so many samples of each of the first recordings, and what is said of the rest."""
+    recordings, usable, cut = [*clocks.recordings], [*clocks.usable], []
+    for k, length in enumerate(lengths):
+        whole = recordings[k]
+        if length < len(whole):
+            recordings[k], usable[k] = whole.taken(slice(0, length)), usable[k][:length]
+            cut.append(f"of {whole.name} the first {recordings[k].duration_s:.0f} of {whole.duration_s:.0f} s")
+    if not cut:
+        return clocks, []
+    said = (
+        f"loads as quick as these are not all fitted at once, {first_names(cut)}: what changes later is not seen (fit"
+        " shorter recordings, from early and from late)"
+    )
+    return replace(clocks, recordings=recordings, usable=usable), [said]

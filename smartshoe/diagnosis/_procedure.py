@@ -23,6 +23,7 @@ from smartshoe.diagnosis._force import (
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
+from smartshoe.diagnosis._lack_of_fit import repeating
 from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._limits import (
     SAID,
@@ -187,9 +188,12 @@ def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> 
     sessions, thresholds = given.sessions, given.thresholds
     models = found.baseline.model, found.fit.model
     plain, residuals = ([residual_of(one, model) for one in sessions] for model in models)
-    before, after = (residual_structure(sessions, one, thresholds) for one in (plain, residuals))
+    off = [[residual_of(one, model) for one in given.fine] for model in models]
+    before, after = (
+        residual_structure(sessions, left, thresholds, repeating(given.fine, at_full_rate, thresholds))
+        for left, at_full_rate in zip((plain, residuals), off, strict=True)
+    )
     within = _left_of_what_was_fitted(sessions, residuals, thresholds)
-    off = ([residual_of(one, model) for one in given.fine] for model in models)
     return _LeftOver(before, after, within, known_error(faults, sessions, given.scale), *off)
 
 

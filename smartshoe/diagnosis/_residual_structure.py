@@ -71,15 +71,21 @@ class ResidualStructure:
 
 
 def residual_structure(
-    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
+    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds, quick: LackOfFit | None = None
 ) -> ResidualStructure:
-    """Both tests of the residuals, and the place of the largest part."""
+    """Both tests of the residuals, and the place of the largest part.
+
+    ``quick`` is the first at the full rate: what swings faster than the fastest ramp asks is averaged out of a fit.
+    """
     memory = gauss_markov_of(sessions, residuals, thresholds)
     says = worst_place(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
+    repeats = repeating(sessions, residuals, thresholds)
+    if quick is not None and quick.significant and quick.rms > repeats.rms:
+        repeats = quick
     return ResidualStructure(
-        repeating(sessions, residuals, thresholds),
+        repeats,
         slow(sessions, residuals, thresholds),
         memory,
         says,

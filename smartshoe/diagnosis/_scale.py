@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -123,14 +124,34 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
         finest.append(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)  # time stamps are rounded
     total = sum(len(recording) for recording in recordings)
     shape = max(1, int(min(finest)))
-    wanted, most = -(-total // MOST_SAMPLES), -(-total // round(MOST_COARSENED * MOST_SAMPLES))
+    wanted = -(-total // MOST_SAMPLES)
     factors = []
     for steps in finest:
         # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
         kept = int(MOST_COARSENED * min(steps, max(1, int(steps)))) or round(MOST_COARSENED)
-        factors.append(max(shape, min(wanted, max(kept, most))))
+        factors.append(max(shape, min(wanted, kept)))
     alike = min(factors)
     return [one if one >= thresholds.clear * alike else alike for one in factors]
+
+
+def fitted_lengths(recordings: Sequence[Recording], factors: Sequence[int]) -> list[int]:
+    """Samples from the beginning of each recording that are fitted: all, unless thinned by ``factors`` they are many.
+
+    Quick loads that go on for hours, thinned further, would be told as a delay; and one part of them is like another.
+    Short recordings stay whole, of the others all give up what is beyond one length.
+    """
+    counts = [len(one) / factor for one, factor in zip(recordings, factors, strict=True)]
+    room, longest = MOST_COARSENED * MOST_SAMPLES, math.inf
+    for place, count in enumerate(sorted(counts)):
+        even = room / (len(counts) - place)
+        if count > even:
+            longest = even
+            break
+        room -= count
+    return [
+        len(one) if count <= longest else math.ceil(longest * factor)
+        for one, count, factor in zip(recordings, counts, factors, strict=True)
+    ]
 
 
 def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
+from smartshoe.diagnosis._arms import arms_of, effect_count, late_beside_usual_arm, with_arm, with_odds
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, additions
@@ -13,6 +13,7 @@ from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.models.effects import listed
+from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 
 Progress = Callable[[str], None]
@@ -77,15 +78,17 @@ def better_from(begun: State, state: State, progress: Progress) -> State:
 def better_from_one(begun: State, state: State, progress: Progress) -> State:
     """What settles from one of the likeliest effects alone, where that follows better than the several of ``state``.
 
-    Several that are each fitted a little may promise more in one linearisation than one that is large.
+    Several that are each fitted a little may promise more in one linearisation than one that is large. So may what
+    relaxes or is late beside an arm that imitates a lag: a lag alone is tried beside an arm as units have.
     """
-    if effect_count(state.fit.model) - effect_count(begun.fit.model) < 2:
-        return state
-    likelihood = state.likelihood()
-    few = [begun.evidence.posterior((*begun.start, k)) for k in additions(begun.evidence, begun.start, RIVALS)]
-    fits = [fit(likelihood, with_members(begun.given, one, begun.fit.model, likelihood)) for one in few]
+    likelihood, fits = state.likelihood(), []
+    if effect_count(state.fit.model) - effect_count(begun.fit.model) > 1:
+        few = [begun.evidence.posterior((*begun.start, k)) for k in additions(begun.evidence, begun.start, RIVALS)]
+        fits = [fit(likelihood, with_members(begun.given, one, begun.fit.model, likelihood)) for one in few]
+    if any(part.effect.is_latency or isinstance(part.effect, CoreEffect) for part in state.fit.model.parts):
+        fits.append(late_beside_usual_arm(begun))
     one = min(fits, key=lambda one: one.cost, default=begun.fit)
-    if not _is_simpler(one, state):
+    if one is begun.fit or not _is_simpler(one, state):
         return state
     progress(f"beginning anew from {listed(one.model.names)}")
     return better_from(state_at(one), state, progress)

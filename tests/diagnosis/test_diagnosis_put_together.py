@@ -125,8 +125,9 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         wall_ratio=None,
     )
 
-    def structure(sessions: Any, residuals: Any, thresholds: Any) -> Any:
+    def structure(sessions: Any, residuals: Any, thresholds: Any, quick: Any = None) -> Any:
         made.seen.setdefault("structure", []).append((list(sessions), list(residuals)))
+        made.seen.setdefault("quick", []).append(quick)
         return made.kinds[len(made.seen["structure"]) - 1]
 
     def answer(name: str, value: Any) -> None:
@@ -143,6 +144,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("infer", found)
     answer("residual_of", lambda session, model: f"{getattr(session, 'name', session)} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
+    answer("repeating", lambda fine, left, thresholds: (fine, left))
     answer("names_of", lambda *_: tuple(made.names))
     answer("other_kind_of", lambda name, *_: "it turned" if name.name == "turned" else None)
     answer("zeros_of", lambda *_: tuple(made.zeros))

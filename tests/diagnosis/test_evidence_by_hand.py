@@ -93,7 +93,7 @@ class _Twin:
         sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.imperfection)
         sds[: self.given.own] = 1.0
         for one in self.given.candidates:
-            if one.effect.why_unnamed:  # what no law does is no small imperfection
+            if one.effect.is_flexible:  # a form of laws whose imperfections count
                 sds[[c - 1 for c in one.columns]] = 0.0
         for member in members:
             sds[[c - 1 for c in self.given.candidates[member].columns]] = self.given.thresholds.strength_sd

@@ -39,7 +39,7 @@ def _given(slots: Mapping[str, str] = FAMILIES) -> Linearised:
         target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
         rows.append(np.column_stack([target, columns]))
     candidates: Any = tuple(
-        SimpleNamespace(name=n, columns=c, slot=slots[n], effect=SimpleNamespace(family=FAMILIES[n], why_unnamed=""))
+        SimpleNamespace(name=n, columns=c, slot=slots[n], effect=SimpleNamespace(family=FAMILIES[n], is_flexible=False))
         for n, c in zip(NAMES, COLUMNS, strict=True)
     )
     return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)

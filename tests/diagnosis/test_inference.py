@@ -78,6 +78,8 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
         prior = np.full(rows.shape[1] - 1, limits.imperfection)
         prior[: given.own] = 1.0
+        for one in given.candidates:
+            prior[[c - 1 for c in one.columns]] *= not one.effect.is_flexible
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
         kept = session.fitted

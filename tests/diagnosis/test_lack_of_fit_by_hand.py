@@ -61,7 +61,7 @@ def _pressed(*shapes: tuple[int, float], foot: float = 0.0) -> tuple[Array, NDAr
 
 # -- what repeats -----------------------------------------------------------------------------------------------------
 def _slow_repeats(sessions: list[Any], residuals: list[Array]) -> list[tuple[list[Array], float]]:
-    kinds: list[tuple[float, float, list[Array], list[int]]] = []
+    kinds: list[tuple[float, float, list[Any]]] = []
     total = 0
     for session, residual in zip(sessions, residuals, strict=True):
         load = session.conditions.load
@@ -78,18 +78,33 @@ def _slow_repeats(sessions: list[Any], residuals: list[Array]) -> list[tuple[lis
             span_of = range(above[0], above[-1] + 1)
             if sum(session.usable[i] for i in span_of) < 0.9 * len(span_of):
                 continue
-            places = [above[0] + (above[-1] - above[0]) * k / 63.0 for k in range(64)]
-            seen = [i for i in span_of if session.usable[i]]
-            row = np.interp(places, seen, residual[seen])
+            rest = range(above[-1] + 1, own[-1] + 1)
+            rests = len(rest) if sum(session.usable[i] for i in rest) >= 0.9 * len(rest) else 0
             duration_s = (above[-1] - above[0]) * session.conditions.step_s
-            for first_peak, first_s, rows, sizes in kinds:
+            made = (session, residual, above, rests)
+            for first_peak, first_s, cycles in kinds:
                 if abs(peak - first_peak) <= ALIKE * first_peak and abs(duration_s - first_s) <= ALIKE * first_s:
-                    rows.append(row)
-                    sizes.append(len(span_of))
+                    cycles.append(made)
                     break
             else:
-                kinds.append((peak, duration_s, [row], [len(span_of)]))
-    return [(rows, sum(sizes) / total) for _, _, rows, sizes in kinds if len(rows) > 1]
+                kinds.append((peak, duration_s, [made]))
+    found = []
+    for _, first_s, cycles in kinds:
+        if len(cycles) < 2:
+            continue
+        rest = min(rests for _, _, _, rests in cycles)
+        count = round(64 * rest * STEP_S / first_s)
+        rows = []
+        for session, residual, above, _ in cycles:
+            places = [above[0] + (above[-1] - above[0]) * k / 63.0 for k in range(64)]
+            places += [above[-1] + rest * (k + 1) / count for k in range(count)]
+            last = next(
+                (i for i in range(above[-1], len(residual) - 1) if session.cycle[i + 1] != session.cycle[i]), None
+            )
+            seen = [i for i in range(above[0], (len(residual) if last is None else last + 1)) if session.usable[i]]
+            rows.append(np.interp(places, seen, residual[seen]))
+        found.append((rows, sum(above[-1] - above[0] + 1 + rest for _, _, above, _ in cycles) / total))
+    return found
 
 
 def _slow_repeating(kinds: list[tuple[list[Array], float]]) -> tuple[float, float, int]:
@@ -97,15 +112,17 @@ def _slow_repeating(kinds: list[tuple[list[Array], float]]) -> tuple[float, floa
     pairs = 0
     for rows, share in kinds:
         count = len(rows)
+        places = len(rows[0])
         products = [float(np.mean(rows[i] * rows[j])) for i in range(count) for j in range(i + 1, count)]
         mean = sum(rows) / count
         auto = [
             sum(
-                float(np.sum((row - mean)[lag:] * (row - mean)[: 64 - lag])) / 64.0 for row in rows
+                float(np.sum((row - mean)[lag:] * (row - mean)[: places - lag])) / places for row in rows
             ) / (count - 1)
-            for lag in range(64)
+            for lag in range(places)
         ]  # fmt: skip
-        spread = (auto[0] ** 2 + 2.0 * sum((1.0 - lag / 64.0) * auto[lag] ** 2 for lag in range(1, 64))) / 64.0
+        fewer = [1.0 - lag / places for lag in range(places)]
+        spread = (auto[0] ** 2 + 2.0 * sum(fewer[lag] * auto[lag] ** 2 for lag in range(1, places))) / places
         power += share * sum(products) / len(products)
         variance += share**2 * spread / len(products)
         pairs += len(products)
@@ -133,7 +150,8 @@ def _runs() -> tuple[list[Any], list[Array]]:
 def test_rows_of_cycles_that_come_back_are_those_of_written_out_sums() -> None:
     sessions, residuals = _runs()
     found, twin = repeats(sessions, residuals, ALIKE), _slow_repeats(sessions, residuals)
-    assert [rows.shape for rows, _ in found] == [(len(rows), PLACES) for rows, _ in twin]
+    assert [rows.shape for rows, _ in found] == [(len(rows), len(rows[0])) for rows, _ in twin]
+    assert {len(rows[0]) for rows, _ in twin} == {PLACES, PLACES + 1}  # some end in a sample below a tenth
     assert len(twin) == 4  # the fast, the slow, those of half the load, and the shortest
     for (rows, share), (slow_rows, slow_share) in zip(found, twin, strict=True):
         assert rows == pytest.approx(np.array(slow_rows), abs=1e-9)
@@ -152,6 +170,23 @@ def test_the_power_of_what_repeats_and_its_score_are_those_of_written_out_sums(t
     turned = repeating(sessions, [one * sign for one, sign in zip(residuals, signs, strict=True)], STANDARD)
     if turned.z < 0.0:
         assert turned.rms == 0.0
+
+
+def test_what_swings_on_at_rest_repeats_as_what_swings_under_load() -> None:
+    """For as long as the unit rests after each of them, and no longer."""
+    load, cycle = np.zeros(500), np.repeat(np.arange(3), [160, 160, 180])
+    for start in (20, 180, 340):
+        load[start : start + 60] = 1.0
+    ringing = np.zeros(500)
+    for start in (80, 240, 400):
+        ringing[start : start + 40] = 0.01 * np.sin(0.9 * np.arange(40)) * np.exp(-0.05 * np.arange(40))
+    noise = 1e-4 * np.random.default_rng(2).standard_normal(500)
+    ((rows, share),) = repeats([_session(load, cycle)], [ringing + noise], ALIKE)
+    assert share == pytest.approx(3 * (60 + 80) / 500)
+    assert rows.shape == (3, PLACES + round(PLACES * 80 / 59))
+    found = repeating([_session(load, cycle)], [ringing + noise], STANDARD)
+    assert found.significant
+    assert found.rms == pytest.approx(np.sqrt(np.mean(ringing**2)), rel=0.1)
 
 
 def test_loads_of_one_height_and_duration_that_go_by_other_courses_repeat_nothing() -> None:

@@ -157,7 +157,8 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
         start=(), given=None, fit=SimpleNamespace(model=SimpleNamespace(names=(), parts=(), relaxing_share=0.1)),
         evidence=SimpleNamespace(posterior=lambda members: members[0]),
     )  # fmt: skip
-    model = SimpleNamespace(names=tuple(found), parts=tuple(found), relaxing_share=0.1)
+    parts = tuple(SimpleNamespace(effect=effect("dead_band")) for _ in found)
+    model = SimpleNamespace(names=tuple(found), parts=parts, relaxing_share=0.1)
     state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD)
     said: list[str] = []
     monkeypatch.setattr(_settling, "additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
@@ -172,6 +173,26 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
     told = _settling.better_from_one(begun, state, said.append)
     assert told == (("y",) if one_is else state)
     assert said == (["beginning anew from y"] if one_is else [])
+
+
+@pytest.mark.parametrize(
+    ("found", "is_tried"),
+    [("dead_band", False), ("delay", True), ("sensor_lag", True), ("second_relaxation", True), ("linear_leak", True)],
+)
+def test_a_lag_alone_is_tried_beside_a_usual_arm_where_anything_is_late_or_relaxes(
+    monkeypatch: pytest.MonkeyPatch, found: str, is_tried: bool
+) -> None:
+    """A single wrong effect about an arm that imitates a lag is no better than several."""
+    begun: Any = SimpleNamespace(fit=SimpleNamespace(model=SimpleNamespace(parts=(), relaxing_share=0.1)))
+    model = SimpleNamespace(parts=(SimpleNamespace(effect=effect(found)),), relaxing_share=0.1)
+    state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None)
+    late: Any = SimpleNamespace(cost=1.0, model=SimpleNamespace(names=("sensor_lag",)))
+    monkeypatch.setattr(_settling, "late_beside_usual_arm", lambda one: late)
+    monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: other is late)
+    monkeypatch.setattr(_settling, "state_at", lambda one: one.model.names)
+    monkeypatch.setattr(_settling, "better_from", lambda begun, state, progress: begun)
+    told: Any = _settling.better_from_one(begun, state, lambda said: None)
+    assert told == (("sensor_lag",) if is_tried else state)
 
 
 @pytest.mark.parametrize(("names", "apart", "joins"), [("ba", 0.9, True), ("ba", 1.1, False), ("ac", 0.0, False)])

@@ -86,7 +86,7 @@ def test_what_is_being_done_is_said_on_the_way(found: Diagnosis, told: list[str]
     assert told[-1] == "judging on held-out data"
     assert "weighing alternatives" in told
     assert any("curve of free form" in one for one in told if one.startswith("fitting "))
-    assert "trying laws in the place of curve of free form" in told
+    assert any(one.startswith("trying laws in the place of curve of free form") for one in told)
 
 
 def test_parameters_are_in_newtons_and_millibars_within_their_intervals(found: Diagnosis) -> None:
