@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -105,3 +109,31 @@ def measured(request: pytest.FixtureRequest) -> Path:
 def root() -> Path:
     """The checkout."""
     return ROOT
+
+
+@pytest.fixture
+def forget_effects() -> Callable[[], None]:
+    """Makes the catalogue of effects be made anew when it is next asked for, of what is installed by then."""
+    catalogue_module = import_module("smartshoe.models.effects.catalogue")  # the package has a function of this name
+
+    def forget() -> None:
+        for made in ("_offers", "_found", "catalogue", "blocks"):
+            getattr(catalogue_module, made).cache_clear()
+
+    return forget
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch, forget_effects: Callable[[], None]) -> Iterator[ModuleType]:
+    """The module of a package that offers its names in capitals as effects."""
+    module = ModuleType("another_package")
+    monkeypatch.setitem(sys.modules, "another_package", module)
+
+    def offered(group: str) -> tuple[EntryPoint, ...]:
+        return tuple(EntryPoint(name, f"another_package:{name}", group) for name in vars(module) if name[0].isupper())
+
+    monkeypatch.setattr(import_module("smartshoe.models.effects.catalogue"), "entry_points", offered)
+    forget_effects()
+    yield module
+    monkeypatch.undo()
+    forget_effects()

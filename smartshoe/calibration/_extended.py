@@ -12,7 +12,7 @@ from smartshoe.calibration._filter import ForceFilter
 from smartshoe.calibration._noise_limit import MOST, NoiseLimit, noise_gain
 from smartshoe.display import significant
 from smartshoe.errors import UsageError
-from smartshoe.models.effects import Memoryless
+from smartshoe.models.effects import Memoryless, refuse_other_size
 from smartshoe.models.effects.effect import ChainContext, CStep, Inverse
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel, Part
@@ -132,8 +132,9 @@ class ExtendedCompensator(ForceFilter):
         signal = readings / self.reading_per_share
         # Far beyond full scale a curve may have no load that gives the reading: it is passed over there.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            for _, inverse in self.blocks:
+            for name, inverse in self.blocks:
                 undone = inverse.push(signal, time_s)
+                refuse_other_size(name, undone, signal.size)
                 finite = np.isfinite(undone)
                 signal = undone if finite.all() else np.where(finite, undone, signal)
         return np.asarray(self.model.full_scale_load_n * signal)

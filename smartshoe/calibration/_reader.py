@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from smartshoe.errors import InputError, UsageError
+from smartshoe.errors import InputError
 from smartshoe.files.gate import parsed_json, read_text
+from smartshoe.models.effects import why_not_known
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 
@@ -106,14 +107,18 @@ class Reader:
         effects = self.mapping(given, "effects", f"{key}.")
         for name in effects:
             above = f"{key}.effects.{name}."
+            why = why_not_known(name)
+            if why:
+                raise InputError(
+                    f"{self.path}: key '{above[:-1]}' is of an effect that is not known here ({why}): install or mend"
+                    " the package that offers it"
+                )
             for parameter in self.mapping(effects, name, f"{key}.effects."):
                 self.number(effects[name], parameter, above)
         try:
             model = ExtendedModel.from_dict(given)
         except KeyError as error:
             raise self.fault(f"{key}.effects.*.{error.args[0]}", "is missing") from error
-        except UsageError as error:
-            raise self.fault(f"{key}.effects", f"is not understood ({error})") from error
         except TypeError as error:
             raise self.fault(key, f"holds a key that is not known ({error})") from error
         for part in model.parts:

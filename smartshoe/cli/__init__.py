@@ -170,6 +170,8 @@ def _reported(error: Exception) -> int:
         message, status = "stopped by the user; nothing half-written is left", 130
     elif isinstance(error, SmartShoeError):
         message, status = str(error), error.exit_status
+    elif not isinstance(error, MemoryError) and (failed := _of_other_packages(error)):
+        message = failed
     elif isinstance(error, OSError):
         what = error.filename or "the output"
         message = f"{what} cannot be read or written ({error.strerror or error}): check its disk and permissions"
@@ -180,6 +182,13 @@ def _reported(error: Exception) -> int:
         status = 1
     click.echo(f"error: {_one_line(message)}", err=True)
     return status
+
+
+def _of_other_packages(error: Exception) -> str:
+    """The sentence about an effect of another package that failed, '' where none did."""
+    from smartshoe.models.effects import failure_of_others
+
+    return failure_of_others(error)
 
 
 def main() -> None:

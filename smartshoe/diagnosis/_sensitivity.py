@@ -22,7 +22,7 @@ from smartshoe.diagnosis._noise import FLOOR, correlated_sd
 from smartshoe.diagnosis._session import Session, fitted_of, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family
+from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family, origin_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.lags import lagged
 
@@ -330,7 +330,7 @@ def _refuse_endless(power: Array, candidates: Sequence[Candidate]) -> None:
         if not np.isfinite(power[list(one.columns)]).all():
             at = ", ".join(f"{name} = {value:g}" for name, value in one.shape.items())
             raise UsageError(
-                f"effect {one.name!r} gives readings that are no finite numbers{' at ' + at if at else ''}: mend its"
+                f"{origin_of(one.name)} gives readings that are no finite numbers{' at ' + at if at else ''}: mend its"
                 " apply, or uninstall the package that offers it"
             )
 

@@ -15,6 +15,7 @@ from smartshoe.devices.serial_link.reconnect import Backoff
 from smartshoe.errors import DeviceError, SmartShoeError
 from smartshoe.live._pace import paced
 from smartshoe.live._shoe import LiveShoe
+from smartshoe.models.effects import failure_of_others
 
 if TYPE_CHECKING:
     from smartshoe.live._pace import Pace
@@ -90,7 +91,8 @@ class Source:
         except SmartShoeError as error:
             self._fail(str(error))
         except Exception as error:  # a fault of ours must be seen, not leave a picture that stands still
-            self._fail(f"{self.live.shoe}: showing failed ({type(error).__name__}: {error}); please report this")
+            why = f"showing failed ({type(error).__name__}: {error}); please report this"
+            self._fail(f"{self.live.shoe}: {failure_of_others(error) or why}")
             raise
 
     def _one(self, block: Block) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array
 from smartshoe.models.core import USUAL_WALL_RATIO, Core, network
-from smartshoe.models.effects.catalogue import effect
+from smartshoe.models.effects.catalogue import effect, refuse_other_size
 from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter
 from smartshoe.models.elements import Arm, Element
 
@@ -164,6 +164,7 @@ class ExtendedModel:
             else:
                 given = self._around(conditions) if part.effect.bends_beside_arm else conditions
                 signal = part.effect.apply(signal, given, part.values)
+                refuse_other_size(part.name, signal, conditions.load.size)
         return self.gain * signal
 
     def _around(self, conditions: Conditions) -> Conditions:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from importlib import import_module
-from importlib.metadata import EntryPoint
 from types import ModuleType
 
 import numpy as np
@@ -26,7 +23,6 @@ from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect, in_words
 from smartshoe.models.extended import ExtendedModel
 
-catalogue_module = import_module("smartshoe.models.effects.catalogue")  # the package has a function of this name
 Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
@@ -462,24 +458,10 @@ class Breathing(Effect):
 
 
 @pytest.fixture
-def breathing(monkeypatch: pytest.MonkeyPatch) -> Iterator[Effect]:
+def breathing(installed: ModuleType) -> Effect:
     """An effect of another package, as if that were installed."""
-    module = ModuleType("another_package")
-    module.Breathing = Breathing  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "another_package", module)
-
-    def offered(group: str) -> tuple[EntryPoint, ...]:
-        return (EntryPoint("breathing", "another_package:Breathing", group),)
-
-    def forget() -> None:
-        for made in (catalogue_module._found, catalogue_module.catalogue, catalogue_module.blocks):
-            made.cache_clear()
-
-    monkeypatch.setattr(catalogue_module, "entry_points", offered)
-    forget()
-    yield Breathing()
-    monkeypatch.undo()
-    forget()
+    installed.Breathing = Breathing  # type: ignore[attr-defined]
+    return effect("breathing")
 
 
 def test_an_effect_of_another_package_is_named(breathing: Effect) -> None:
@@ -490,16 +472,15 @@ def test_an_effect_of_another_package_is_named(breathing: Effect) -> None:
     assert found.causes[0].held_out.ci95[0] > 0
 
 
-def test_without_that_package_another_name_is_given_or_none(breathing: Effect) -> None:
+def test_without_that_package_another_name_is_given_or_none(
+    breathing: Effect, installed: ModuleType, forget_effects: Callable[[], None]
+) -> None:
     """The name above follows from the entry point, not from anything here."""
     model = MODEL.with_part(breathing, np.array([0.06, 20.5]))
     runs = [recording(model, seed) for seed in range(2)]
-    catalogue_module._found.cache_clear()
-    catalogue_module.catalogue.cache_clear()
-    catalogue_module.blocks.cache_clear()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(catalogue_module, "entry_points", lambda group: ())
-        assert "breathing" not in {cause.name for cause in diagnose(runs[:1], hold_out=runs[1:]).causes}
+    del installed.Breathing
+    forget_effects()
+    assert "breathing" not in {cause.name for cause in diagnose(runs[:1], hold_out=runs[1:]).causes}
 
 
 def test_an_effect_of_another_package_that_gives_no_numbers_is_told(

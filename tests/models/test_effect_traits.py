@@ -10,6 +10,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint
 from itertools import combinations
 from pathlib import Path
+from random import random
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -26,12 +27,15 @@ from smartshoe.models.effects import (
     EffectParameter,
     Inverse,
     Memoryless,
+    NoiseEffect,
     blocks,
     by,
     catalogue,
     effect,
+    in_words,
+    shift_of,
     told_apart_by,
-)  # fmt: skip
+)
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, WORDS
 from smartshoe.models.extended import ExtendedModel
 
@@ -235,28 +239,6 @@ class Crease(Effect):
         )
 
 
-@pytest.fixture
-def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """A module that entry points can name, and the catalogue made anew before and after."""
-    import sys
-
-    module = ModuleType("another_package")
-    monkeypatch.setitem(sys.modules, "another_package", module)
-
-    def forget() -> None:
-        for made in (catalogue_module._found, catalogue_module.catalogue, catalogue_module.blocks):
-            made.cache_clear()
-
-    def offered(group: str) -> tuple[EntryPoint, ...]:
-        return tuple(EntryPoint(name, f"another_package:{name}", group) for name in vars(module) if name[0].isupper())
-
-    monkeypatch.setattr(catalogue_module, "entry_points", offered)
-    forget()
-    yield module
-    monkeypatch.undo()
-    forget()
-
-
 @pytest.mark.parametrize("offer", [Crease, Crease()], ids=["class", "instance"])
 def test_an_effect_of_another_package_is_as_good_as_any(installed: ModuleType, offer: object) -> None:
     installed.Crease = offer  # type: ignore[attr-defined]
@@ -272,24 +254,31 @@ def test_an_effect_of_another_package_is_as_good_as_any(installed: ModuleType, o
     )
 
 
-def _named(name: str) -> Effect:
-    return type("Named", (Crease,), {"name": name})()
+def _wrong(**traits: object) -> Effect:
+    return type("Wrong", (Crease,), traits)()
 
 
-def _placed(place: str) -> Effect:
-    return type("Placed", (Crease,), {"place": place})()
+def _noise(**traits: object) -> Effect:
+    return type("Noisy", (NoiseEffect,), {**vars(effect("hum").__class__), "name": "rumble", **traits})()
 
 
-def _shown(word: str) -> Effect:
-    return type("Shown", (Crease,), {"exposed_by": frozenset({word})})()
-
-
-def _failing(**wrong: object) -> Effect:
-    return type("Failing", (Crease,), wrong)()
+def _number(**numbers: Any) -> Effect:
+    return _wrong(parameters=(replace(Crease.parameters[0], **numbers),))
 
 
 def _with_a_bug(self: Effect, *_: object) -> Any:
     raise KeyError("gauge")
+
+
+def _on_long_signals(made: object) -> Any:
+    """A method that fails, or gives ``made``, for as many samples as a recording has."""
+
+    def apply(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Any:
+        if signal.size < 1000:
+            return Crease.apply(Crease(), signal, conditions, values)
+        return _with_a_bug(self) if made is None else made
+
+    return apply
 
 
 def _in_place(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Array:
@@ -297,27 +286,81 @@ def _in_place(self: Effect, signal: Array, conditions: Conditions, values: Array
     return signal
 
 
+def _undone_by(undo: Any) -> Effect:
+    return _wrong(inverse=lambda self, values, step_s: Memoryless(undo, "x = x;"))
+
+
+def _needing_a_thermometer(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Array:
+    return signal + values[0] * conditions.temperature_k  # type: ignore[operator]
+
+
+def _ends_the_program() -> Effect:
+    raise SystemExit(3)
+
+
+KNEE = EffectParameter("knee", "FS_load", "where it bends", None, 0.0, 1.0, 0.1)
+STRENGTH = Crease.parameters[0]
+
+
 @pytest.mark.parametrize(
     ("offer", "said"),
     [
-        (_failing(apply=_with_a_bug), r"'Wrong' fails \(KeyError: 'gauge'\): mend or uninstall the package"),
-        (_failing(apply=lambda self, signal, conditions, values: signal[:5]), r"of shape \(5,\) for a signal"),
-        (_failing(apply=lambda self, signal, conditions, values: 3.0), r"of shape \(\) for a signal"),
-        (_failing(apply=_in_place), "read-only"),
-        (_failing(inverse=_with_a_bug), "fails .*gauge"),
-        (_failing(inverse=lambda self, values, step_s: 5), "gives 5, which is neither an Inverse nor None"),
-        (
-            _failing(parameters=(EffectParameter("knee", "FS_load", "where it bends", None, 0.0, 1.0, 0.1),)),
-            "parameter knee has no value",
-        ),
-        (_failing(shapes=({"width": 0.5},), apply=_with_a_bug), "fails at width = 0.5"),
-        (_named("linear_leak"), "'Wrong' has the name 'linear_leak', which is taken"),
-        (_named("flexible_loop"), "taken"),
-        (_placed("roof"), "has the place 'roof': use one of machine"),
-        (_shown("earthquakes"), "is shown by earthquakes"),
+        (_wrong(apply=_with_a_bug), r"'Wrong' fails \(KeyError: 'gauge'\): mend or uninstall the package"),
+        (_wrong(apply=lambda self, signal, conditions, values: signal[:5]), r"of shape \(5,\) for a signal"),
+        (_wrong(apply=lambda self, signal, conditions, values: 3.0), r"of shape \(\) for a signal"),
+        (_wrong(apply=lambda self, signal, conditions, values: signal.tolist()), "apply gives list, no array of"),
+        (_wrong(apply=lambda self, signal, conditions, values: signal + 0j), "apply gives complex128, no array of"),
+        (_wrong(apply=lambda self, signal, conditions, values: signal.astype("f4")), "apply gives float32, no array"),
+        (_wrong(apply=lambda self, signal, conditions, values: signal / 0.0), "apply gives values that are no finite"),
+        (_wrong(apply=_on_long_signals(None)), "fails .KeyError: 'gauge'"),
+        (_wrong(apply=_on_long_signals(np.zeros(7))), r"of shape \(7,\) for a signal"),
+        (_wrong(apply=lambda self, signal, conditions, values: 0.9 * signal), "is not the identity, but 0.097 of full"),
+        (_wrong(apply=lambda self, signal, conditions, values: signal + values[0] * random()), "other numbers"),
+        (_wrong(apply=_needing_a_thermometer), "fails .TypeError"),
+        (_wrong(apply=_in_place), "read-only"),
+        (_wrong(inverse=_with_a_bug), "fails .*gauge"),
+        (_wrong(inverse=lambda self, values, step_s: 5), "gives 5, which is neither an Inverse nor None"),
+        (_undone_by(lambda signal, time_s: 1 / 0), "fails .ZeroDivisionError"),
+        (_undone_by(lambda signal, time_s: signal[:-1]), r"inverse's push gives values of shape \(31,\)"),
+        (_undone_by(lambda signal, time_s: signal.astype("f4")), "inverse's push gives float32"),
+        (_undone_by(lambda signal, time_s: signal * np.inf), "inverse's push gives values that are no finite"),
+        (_undone_by(lambda signal, time_s: signal - signal[0]), "inverse gives other numbers where the stream is cut"),
+        (_noise(evidence=_with_a_bug), "gauge"),
+        (_noise(evidence=lambda *_: "much"), "evidence gives 'much', which is neither"),
+        (_wrong(parameters=()), "has no parameter with a null value"),
+        (_wrong(parameters=[STRENGTH]), "no tuple of EffectParameter"),
+        (_wrong(parameters=(STRENGTH, STRENGTH)), "has two parameters of the name 'gained'"),
+        (_wrong(parameters=(KNEE,), shapes=({"knee": 0.5},)), "has no parameter with a null value"),
+        (_wrong(parameters=(STRENGTH, KNEE)), "has a shape in which parameter knee has no value"),
+        (_wrong(parameters=(STRENGTH, KNEE), shapes=({"knee": 2.0},)), "knee = 2.0, which is not within its bounds"),
+        (_wrong(parameters=(STRENGTH, KNEE), shapes=({"knee": 0.5},), apply=_with_a_bug), "fails at knee = 0.5"),
+        (_wrong(shapes=({"width": 0.5},)), "has a shape of 'width', which is no parameter"),
+        (_wrong(shapes=()), "would never be tried"),
+        (_number(name="per cent"), "'per cent' whose name is no word"),
+        (_number(unit=None), "whose unit or says is no text"),
+        (_number(lower=0.5, upper=-0.5), "lower bound 0.5 is not below its upper one, -0.5"),
+        (_number(upper=np.inf), "not all finite numbers"),
+        (_number(size=0.0), "of size 0, which must be above 0"),
+        (_number(null=0.9), "null value 0.9 is not within its bounds"),
+        (_number(channel="moon"), "of the channel 'moon', which is none of"),
+        (_wrong(name="linear_leak"), "'Wrong' has the name 'linear_leak', which is taken"),
+        (_wrong(name="flexible_loop"), "taken"),
+        (_wrong(name="a crease"), "has the name 'a crease', which is no word"),
+        (_wrong(family=7), "has the family 7, which is no text"),
+        (_wrong(branch=None), "has branch = None, which is no str"),
+        (_wrong(is_memoryless="yes"), "has is_memoryless = 'yes', which is no bool"),
+        (_wrong(shifts="reading"), "has shifts = 'reading', which effects of smartshoe alone may say"),
+        (_wrong(place="roof"), "has the place 'roof', which is none of machine"),
+        (_wrong(place="core"), "but CoreEffects, and no others"),
+        (_wrong(exposed_by=frozenset({"earthquakes"})), "is shown by earthquakes"),
+        (_wrong(exposed_by="rates"), "has exposed_by = 'rates', which is no set of words"),
+        (_wrong(needs=by("holds")), "is shown by holds, which is not known: needs may hold command"),
+        (_wrong(separated_by=("delay",)), "has separated_by = .*, which is no mapping"),
+        (_wrong(separated_by={"delay": "steps"}), r"has separated_by\['delay'\] = 'steps', which is no set of words"),
         (type("Unnamed", (Effect,), {"apply": Crease.apply}), "has no name, no family"),
         (3.0, "no smartshoe.models.effects.Effect"),
         (Effect, "cannot be loaded"),
+        (type("Ends", (Crease,), {"__init__": lambda self: _ends_the_program()}), r"loaded \(SystemExit: 3\)"),
     ],
 )
 def test_what_cannot_take_part_is_refused_by_name(installed: ModuleType, offer: object, said: str) -> None:
@@ -326,10 +369,57 @@ def test_what_cannot_take_part_is_refused_by_name(installed: ModuleType, offer: 
         catalogue()
 
 
+@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
+def test_ours_would_be_taken_from_another_package_too(one: Effect) -> None:
+    if one.shifts or one.between_clocks:
+        one = type("Without", (type(one),), {"shifts": None, "between_clocks": None})()
+    catalogue_module.refuse_faulty(one, "ours")
+
+
+def test_a_program_that_is_stopped_while_a_package_is_loaded_stops(installed: ModuleType) -> None:
+    def stopped(self: Effect) -> None:
+        raise KeyboardInterrupt
+
+    installed.Slow = type("Slow", (Crease,), {"__init__": stopped})  # type: ignore[attr-defined]
+    with pytest.raises(KeyboardInterrupt):
+        catalogue()
+
+
+def test_a_broken_package_keeps_no_other_effect_away(installed: ModuleType) -> None:
+    installed.Crease, installed.Wrong = Crease, _wrong(name="wrong", apply=_with_a_bug)  # type: ignore[attr-defined]
+    assert effect("linear_leak").name == "linear_leak"
+    assert effect("crease").name == "crease"
+    assert in_words("flexible_loop") == "loop of free form"
+    assert shift_of("load").name == "load_cell_tare"
+    with pytest.raises(UsageError, match="'Wrong' fails"):
+        effect("wrong")
+
+
+def _once_too_long(signal: Array, values: Array) -> Array:
+    return signal[:4000] + 0.0 * values[0]
+
+
+def test_what_gives_too_few_values_only_later_is_told_by_name(installed: ModuleType) -> None:
+    installed.Short = short = _wrong(  # type: ignore[attr-defined]
+        name="short",
+        apply=lambda self, signal, conditions, values: _once_too_long(signal, values),
+        inverse=lambda self, values, step_s: Memoryless(
+            lambda signal, time_s: _once_too_long(signal, values), "x = x;"
+        ),
+    )
+    model = BASELINE.with_part(effect("short"), np.array([0.1]))
+    assert model.names == (short.name,)
+    said = r"effect 'short' gives values of shape \(4000,\) for a signal of shape \(5000,\)"
+    with pytest.raises(UsageError, match=said):
+        model.reading(Conditions(0.02 * np.arange(5000), np.zeros(5000), 0.02))
+    with pytest.raises(UsageError, match=said):
+        ExtendedCompensator(model, 50.0).apply(np.zeros(5000))
+
+
 def test_two_packages_cannot_bring_one_name(installed: ModuleType) -> None:
-    installed.First, installed.Second = Crease, _named("crease")  # type: ignore[attr-defined]
+    installed.First, installed.Second = Crease, _wrong(name="crease")  # type: ignore[attr-defined]
     with pytest.raises(UsageError, match="'Second' has the name 'crease', which is taken"):
-        effect("linear_leak")
+        catalogue()
 
 
 def test_an_entry_point_to_nowhere_is_refused(installed: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -343,6 +433,7 @@ def test_every_curve_says_that_it_is_one() -> None:
     """Else it is not weighed against the others; the guide's own effect, which others begin from, is among them."""
     found: dict[str, Any] = {}
     exec(re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)[0], found)
+    catalogue_module.refuse_faulty(found["CreasedTube"](), "the guide's")
     curves = {one.family for one in catalogue().values() if one.is_memoryless}
     shuffled = np.random.default_rng(1).permutation(200)
     for one in (*catalogue().values(), found["CreasedTube"]()):

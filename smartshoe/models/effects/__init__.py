@@ -7,11 +7,15 @@ from smartshoe.models.effects.catalogue import (
     blocks,
     catalogue,
     effect,
+    failure_of_others,
     in_words,
     is_told_from_its_family,
     listed,
+    origin_of,
+    refuse_other_size,
     shift_of,
     told_apart_by,
+    why_not_known,
 )
 from smartshoe.models.effects.effect import Conditions, CoreEffect, CStep, Effect, EffectParameter, Inverse, Place
 from smartshoe.models.effects.exposure import by
@@ -36,9 +40,13 @@ __all__ = [
     "c_number",
     "catalogue",
     "effect",
+    "failure_of_others",
     "in_words",
     "listed",
     "is_told_from_its_family",
+    "origin_of",
+    "refuse_other_size",
     "shift_of",
     "told_apart_by",
+    "why_not_known",
 ]

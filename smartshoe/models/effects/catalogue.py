@@ -12,14 +12,15 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from traceback import walk_tb
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
-from smartshoe.models.effects.effect import PLACES, Conditions, Effect, Inverse
-from smartshoe.models.effects.exposure import WORDS, Exposure
+from smartshoe.models.effects._offered import refuse_faulty
+from smartshoe.models.effects.effect import Effect
+from smartshoe.models.effects.exposure import Exposure
 
 GROUP = "smartshoe.effects"
 ROOM = __name__.rpartition(".")[0]
@@ -31,67 +32,99 @@ def _concrete(kind: Any) -> list[type[Effect]]:
 
 
 @cache
-def _found() -> Mapping[str, Effect]:
+def _own() -> Mapping[str, Effect]:
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         importlib.import_module(f"{ROOM}.{module.name}")
     own = (kind() for kind in _concrete(Effect) if kind.__module__.startswith(ROOM))
-    found = {made.name: made for made in own}
+    return MappingProxyType({made.name: made for made in own})
+
+
+class _Offer(NamedTuple):
+    effect: Effect
+    origin: str
+
+
+@cache
+def _offers() -> tuple[Mapping[str, _Offer], tuple[UsageError, ...]]:
+    """The effects of other packages by name, and why others of them are none: what needs these says so, and no more."""
+    found: dict[str, _Offer] = {}
+    broken = []
     for entry in entry_points(group=GROUP):
-        made = _offered(entry)
-        if made.name in found:
-            raise UsageError(f"{_origin(entry)} has the name {made.name!r}, which is taken: give it another name")
-        found[made.name] = made
-    return MappingProxyType(dict(sorted(found.items())))
+        origin = _origin(entry, entry.name)  # it may have no other name yet
+        try:
+            made = _offered(entry, origin)
+            if made.name in found or made.name in _own():
+                raise UsageError(f"{origin} has the name {made.name!r}, which is taken: give it another name")
+            found[made.name] = _Offer(made, _origin(entry, made.name))
+        except UsageError as error:
+            broken.append(error)
+    return MappingProxyType(found), tuple(broken)
 
 
-def _origin(entry: EntryPoint) -> str:
-    package = f" of the package {entry.dist.name}" if entry.dist else ""
-    return f"effect {entry.name!r}{package}"
+@cache
+def _found() -> Mapping[str, Effect]:
+    offers, broken = _offers()
+    if broken:
+        raise broken[0]
+    return MappingProxyType(dict(sorted({**_own(), **{name: one.effect for name, one in offers.items()}}.items())))
 
 
-def _offered(entry: EntryPoint) -> Effect:
+def _origin(entry: EntryPoint, name: str) -> str:
+    return f"effect {name!r}" + (f" of the package {entry.dist.name}" if entry.dist else "")
+
+
+def _offered(entry: EntryPoint, origin: str) -> Effect:
     """The effect of another package; raises `UsageError` where it is none, or cannot take part in a chain."""
     try:
         made = entry.load()
         made = made() if isinstance(made, type) else made
-    except Exception as error:  # whatever another package does
-        raise UsageError(f"{_origin(entry)} cannot be loaded ({error}): mend or uninstall the package") from error
+    except (Exception, SystemExit) as error:  # whatever another package does
+        why = f"{type(error).__name__}: {error}"
+        raise UsageError(f"{origin} cannot be loaded ({why}): mend or uninstall the package") from error
     if not isinstance(made, Effect):
-        raise UsageError(f"{_origin(entry)} is {made!r}, no smartshoe.models.effects.Effect: mend the package")
-    missing = [word for word in ("name", "family", "stage", "place", "says", "parameters") if not hasattr(made, word)]
-    if missing:
-        raise UsageError(f"{_origin(entry)} has no {', no '.join(missing)}: mend the package")
-    if made.place not in PLACES:
-        raise UsageError(f"{_origin(entry)} has the place {made.place!r}: use one of {', '.join(PLACES)}")
-    unknown = frozenset[str](made.exposed_by).union(*made.separated_by.values()) - WORDS
-    if unknown:
-        raise UsageError(
-            f"{_origin(entry)} is shown by {', '.join(sorted(unknown))}, which is not known:"
-            f" use of {', '.join(sorted(WORDS))}"
-        )
-    _try(made, _origin(entry))
+        raise UsageError(f"{origin} is {made!r}, no smartshoe.models.effects.Effect: mend the package")
+    refuse_faulty(made, origin)
     return made
 
 
-def _try(made: Effect, origin: str) -> None:
-    """Run an effect of another package once at each of its shapes; raises `UsageError` with what it does wrong."""
-    load = 1.0 - np.abs(np.linspace(-1.0, 1.0, 32))
-    load.flags.writeable = False  # what writes to its input spoils that of others
-    time_s, nothing = np.linspace(0.0, 0.02 * (load.size - 1), load.size), np.zeros(load.size)
-    at = Conditions(time_s, load, 0.02, temperature_k=nothing, neighbour=nothing, relaxing=(0.06, 0.2))
-    for shape in made.shapes:
-        try:
-            for values in (made.start(shape), made.begun(shape)):
-                of = np.shape(made.apply(load, at, values))
-                if of != load.shape:
-                    raise ValueError(f"apply gives values of shape {of} for a signal of shape {load.shape}")
-            undone = made.inverse(made.begun(shape), 0.02)
-            if not isinstance(undone, Inverse | None):
-                raise TypeError(f"inverse gives {undone!r}, which is neither an Inverse nor None")
-        except Exception as error:  # whatever another package does
-            at_shape = "".join(f" at {name} = {value:g}" for name, value in shape.items())
-            why = f"{type(error).__name__}: {error}"
-            raise UsageError(f"{origin} fails{at_shape} ({why}): mend or uninstall the package") from error
+def _named(name: str) -> Effect | None:
+    """Ours are found whatever other packages offer."""
+    if name in _own():
+        return _own()[name]
+    offer = _offers()[0].get(name)
+    return None if offer is None else offer.effect
+
+
+def origin_of(name: str) -> str:
+    """Who offers the effect ``name``, as an error tells it: "effect 'creased_tube' of the package our-lab"."""
+    offer = None if name in _own() else _offers()[0].get(name)
+    return f"effect {name!r}" if offer is None else offer.origin
+
+
+def refuse_other_size(name: str, found: Array, size: int) -> None:
+    """Raises `UsageError` where what the effect ``name`` made of a signal (n,) has another shape."""
+    if found.shape != (size,):
+        raise UsageError(
+            f"{origin_of(name)} gives values of shape {found.shape} for a signal of shape ({size},): mend or uninstall"
+            " the package that offers it"
+        )
+
+
+def failure_of_others(error: BaseException) -> str:
+    """The sentence that names the effect of another package in whose code ``error`` was raised, '' where in none's.
+
+    Where no method of an effect is on the way there (an inverse's, say), every effect of that package may be meant.
+    """
+    if not _offers.cache_info().currsize:
+        return ""  # none was loaded, so none has failed
+    frames = [frame for frame, _ in walk_tb(error.__traceback__)]
+    rooms = {str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames} - {"smartshoe"}
+    offers = _offers()[0].values()
+    surely = [one.origin for one in offers if any(frame.f_locals.get("self") is one.effect for frame in frames)]
+    maybe = [one.origin for one in offers if type(one.effect).__module__.partition(".")[0] in rooms]
+    blamed = " or ".join(surely or maybe)
+    why = f"{type(error).__name__}: {error}"
+    return blamed and f"{blamed} fails ({why}): mend or uninstall the package"
 
 
 @cache
@@ -110,7 +143,7 @@ def blocks() -> Mapping[str, tuple[Effect, ...]]:
 
 def in_words(name: str) -> str:
     """What a person calls an effect, or any other word of an identifier; a flexible block is one "of free form"."""
-    found = _found().get(name)
+    found = _named(name)
     said = f"{name.removeprefix('flexible_')} of free form" if found is not None and found.is_flexible else name
     return said.replace("_", " ")
 
@@ -123,20 +156,28 @@ def listed(names: Iterable[str], last: str = "") -> str:
 
 def effect(name: str) -> Effect:
     """The effect or flexible block called ``name``; raises `UsageError` with the names there are."""
-    found = _found().get(name)
+    found = _named(name)
     if found is None:
         raise UsageError(f"there is no effect {name!r}: use one of {', '.join(_found())}")
     return found
 
 
+def why_not_known(name: str) -> str:
+    """Half a sentence where no effect is called ``name``: '' where there is one."""
+    if _named(name) is not None:
+        return ""
+    broken = _offers()[1]
+    return str(broken[0]) if broken else "no package that is installed offers it"
+
+
 def shift_of(signal: Literal["load", "reading"]) -> Effect:
     """The effect that adds one value to the "load" or to the "reading"."""
-    return next(one for one in catalogue().values() if one.shifts == signal)
+    return next(one for one in _own().values() if one.shifts == signal)
 
 
 def between_clocks(what: Literal["lag", "rate"]) -> Effect:
     """The effect whose one value is the "lag" of one clock behind another, or how their "rate" differs."""
-    return next(one for one in catalogue().values() if one.between_clocks == what)
+    return next(one for one in _own().values() if one.between_clocks == what)
 
 
 def told_apart_by(one: Effect, other: Effect) -> frozenset[Exposure]:

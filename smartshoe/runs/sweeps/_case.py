@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from smartshoe.errors import DeviceError, SmartShoeError
 from smartshoe.files.atomic import json_text
 from smartshoe.kernels.blas import on_one_thread
+from smartshoe.models.effects import failure_of_others
 from smartshoe.runs.scenario import ScenarioText, checked, run
 from smartshoe.runs.sweeps._plan import Case
 
@@ -41,14 +42,15 @@ def computed(case: Case) -> str:
     try:
         outcome = {"status": "done", "says": None, "figures": figures_of(_run(case))}
     except SmartShoeError as error:
-        outcome = {"status": "failed", "says": _sentence(error, case), "figures": {}}
+        outcome = {"status": "failed", "says": _sentence(str(error), case), "figures": {}}
     except (OSError, MemoryError) as error:
         raise DeviceError(
             f"case {case.name} could not be computed here ({type(error).__name__}: {error}): mend that, and the same"
             " command goes on"
         ) from error
     except Exception as error:  # one case's fault must not cost the others: it is reported with its name
-        said = f"{type(error).__name__}: {_sentence(error, case)} (a fault of smartshoe's: please report it)"
+        ours = f"{type(error).__name__}: {error} (a fault of smartshoe's: please report it)"
+        said = _sentence(failure_of_others(error) or ours, case)
         outcome = {"status": "failed", "says": said, "figures": {}}
     return json_text(
         {
@@ -69,9 +71,9 @@ def _run(case: Case) -> ScenarioResult:
     return run(checked(case.tables, source), source)
 
 
-def _sentence(error: Exception, case: Case) -> str:
+def _sentence(said: str, case: Case) -> str:
     """What went wrong, with files named from the scenario's folder, so that it is the same on any machine."""
-    return " ".join(str(error).replace(f"{Path(case.source).parent}{os.sep}", "").split())
+    return " ".join(said.replace(f"{Path(case.source).parent}{os.sep}", "").split())
 
 
 def figures_of(result: ScenarioResult) -> Figures:
