@@ -23,9 +23,9 @@ from smartshoe.signals.masks import runs_of
 class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
-    ``present`` holds the words of `Effect.exposed_by` that apply. ``is_judged``: what is held out can be used.
-    ``is_cycled``: a recording that is fitted has more than one load cycle. ``is_unread_at_rest``: it rests without
-    load, and no reading there can be used.
+    ``present`` holds the words of `Effect.exposed_by` that apply to the load, ``channels`` those that were logged
+    beside it. ``is_judged``: what is held out can be used. ``is_cycled``: a recording that is fitted has more than one
+    load cycle. ``is_unread_at_rest``: it rests without load, and no reading there can be used.
     """
 
     rates_per_s: tuple[float, ...]
@@ -36,6 +36,11 @@ class Excitation:
     is_judged: bool = True
     is_cycled: bool = True
     is_unread_at_rest: bool = False
+    channels: frozenset[str] = frozenset()
+
+    def lacking(self, effect: Effect) -> frozenset[str]:
+        """What would show an effect best and is neither in the loads nor logged beside them."""
+        return effect.exposed_by - self.present - self.channels
 
     def shows(self, effect: Effect) -> bool:
         """Whether this data holds any of what shows an effect.
