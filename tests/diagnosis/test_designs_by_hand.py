@@ -159,7 +159,8 @@ def test_a_design_is_of_commanded_loads_at_the_logs_rate_and_noise(monkeypatch: 
         seen["given"] = unit, sessions, limits
         return "columns"
 
-    def compared(columns: Any, sd: float, strength: float, limits: Any) -> Design:
+    def compared(columns: Any, sd: float, strength: float, limits: Any, hidden: frozenset[str]) -> Design:
+        assert hidden == set()  # a load is held
         seen["compared"] = columns, sd, strength, limits
         return _design(7.0)
 
