@@ -233,9 +233,7 @@ def test_a_protocol_of_which_a_log_takes_too_few_samples_is_refused_with_a_remed
         assert f"of which a log of 100 Hz takes {samples}, and a diagnosis needs 100: make it longer" in said
     assert run_command(_asked(tmp_path, text.format(1.0))) == 0
     short = Protocol("short", (Segment("ramp", 10.0, 0.001), Segment("ramp", 0.0, 0.001)))
-    with pytest.raises(
-        UsageError, match=r"protocol short lasts 0\.002 s, of which a log of 100 Hz takes 1 sample"
-    ):
+    with pytest.raises(UsageError, match=r"protocol short lasts 0\.002 s, of which a log of 100 Hz takes 1 sample"):
         design([*ONE_RATE, short])
 
 
