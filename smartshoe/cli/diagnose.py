@@ -166,20 +166,31 @@ def _refuse_beside_design() -> None:
 
 def _design(path: str, json_path: str | None) -> None:
     from smartshoe.cli._output import emit_json, note
-    from smartshoe.diagnosis.design import USUAL_NOISE_PERCENT, USUAL_RATE_HZ, design
+    from smartshoe.devices import schemes
+    from smartshoe.diagnosis.design import USUAL_NOISE_PERCENT, USUAL_RATE_HZ, design, too_short_of
     from smartshoe.report.diagnosis.terminal import print_design
-    from smartshoe.runs.scenario import load, noise_of, protocols_of, sample_rate_of
+    from smartshoe.runs.scenario import check_machines, checked, noise_of, protocols_of, read_tables, sample_rate_of
 
-    scenario, source = load(path)
-    protocols = tuple(protocols_of(scenario, source).values())
-    if not protocols:
-        raise source.error(("protocol",), "there is none, and a design asks about protocols: add a [protocol.dynamic]")
-    unit, percent = noise_of(scenario, source) or (None, USUAL_NOISE_PERCENT)
+    tables, source = read_tables(path)
+    unit = '[[unit]] and name = "left_toe" at its end'
+    if not tables.get("protocol"):
+        mend = "add a [protocol.dynamic]" + ("" if tables.get("unit") else f", and {unit}")
+        raise source.error(("protocol",), f"there is none, and a design asks about protocols: {mend}")
+    if not tables.get("unit"):
+        raise source.error(("unit",), f"there is none, and a design takes noise and rate from units: add {unit}")
+    scenario = checked(tables, source)
+    protocols = protocols_of(scenario, source)
+    named, percent = noise_of(scenario, source) or (None, USUAL_NOISE_PERCENT)
     said_by = "since no unit of the scenario states any above 0"
-    if unit is not None:
-        said_by = f"the largest that a unit of the scenario states ({unit})"
+    if named is not None:
+        said_by = f"the largest that a unit of the scenario states ({named})"
     rate_hz = sample_rate_of(scenario, source) or USUAL_RATE_HZ
-    found = design(protocols, noise_percent=percent, sample_rate_hz=rate_hz)
+    for name, protocol in protocols.items():
+        if said := too_short_of(protocol, rate_hz):
+            raise source.error(("protocol", name), said)
+    if "sim" in schemes():  # a design needs no simulator, and of another machine nobody knows what it stands
+        check_machines(scenario, source)
+    found = design(tuple(protocols.values()), noise_percent=percent, sample_rate_hz=rate_hz)
     note(f"noise of {percent:g} % of full scale, {said_by}; logged at {rate_hz:g} Hz")
     if not emit_json(found.to_dict(), json_path):
         print_design(found)

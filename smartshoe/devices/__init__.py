@@ -2,7 +2,7 @@
 
 from smartshoe.devices._base import Bladder, Block, ChannelDescription, Device, Sensor, Shoe, TestMachine
 from smartshoe.devices._events import Disconnected, Dropped, Gap, Reconnected, Restarted, ShoeEvent
-from smartshoe.devices._registry import open_machine, open_shoe, split_url
+from smartshoe.devices._registry import open_machine, open_shoe, schemes, split_url
 
 __all__ = [
     "Bladder",
@@ -14,6 +14,7 @@ __all__ = [
     "TestMachine",
     "open_machine",
     "open_shoe",
+    "schemes",
     "split_url",
     "Disconnected",
     "Dropped",

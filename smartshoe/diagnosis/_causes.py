@@ -119,7 +119,7 @@ def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> l
 
 def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
     """What the data lacks of that which shows such an effect best."""
-    lacking = name.effect.exposed_by - excitation.present
+    lacking = excitation.lacking(name.effect)
     if not lacking:
         return []
     said = "; ".join(sorted(SAYS[word] for word in lacking))

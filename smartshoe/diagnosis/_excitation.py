@@ -23,9 +23,10 @@ from smartshoe.signals.masks import runs_of
 class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
-    ``present`` holds the words of `Effect.exposed_by` that apply. ``is_judged``: what is held out can be used.
-    ``is_cycled``: a recording that is fitted has more than one load cycle. ``is_unread_at_rest``: it rests without
-    load, and no reading there can be used.
+    ``present`` holds the words of `Effect.exposed_by` that apply to the load, ``channels`` those that were logged
+    beside it. ``is_judged``: what is held out can be used. ``is_cycled``: a recording that is fitted has more than one
+    load cycle. ``is_unread_at_rest``: it rests without load, and no reading there can be used. ``is_held``: a load is
+    borne without moving, be it for less than slow creep takes to be seen.
     """
 
     rates_per_s: tuple[float, ...]
@@ -36,6 +37,20 @@ class Excitation:
     is_judged: bool = True
     is_cycled: bool = True
     is_unread_at_rest: bool = False
+    is_held: bool = False
+    channels: frozenset[str] = frozenset()
+
+    def lacking(self, effect: Effect) -> frozenset[str]:
+        """What would show an effect best and is neither in the loads nor logged beside them."""
+        return effect.exposed_by - self.present - self.channels
+
+    def hides(self, effect: Effect) -> bool:
+        """Whether nothing shows an effect but how exactly its law is that of a corner, since it goes with the rate.
+
+        It does where only several rates or holds show it: at one rate without any hold it is another gain.
+        """
+        goes_with_the_rate = bool(effect.exposed_by) and effect.exposed_by <= {"rates", "holds"}
+        return goes_with_the_rate and len(self.rates_per_s) <= 1 and not self.is_held
 
     def shows(self, effect: Effect) -> bool:
         """Whether this data holds any of what shows an effect.
@@ -67,9 +82,10 @@ class Excitation:
             )
         if len(self.rates_per_s) <= 1:
             seen = "one loading rate only" if self.rates_per_s else "no rise of the load of which the rate is seen"
-            said.append(
-                f"{seen}: nothing can be said of rate dependence, nor can viscous friction be told from Coulomb's"
-            )
+            nothing = "nothing can be said of rate dependence"
+            if self.rates_per_s and self.is_held:
+                nothing = "of rate dependence no more can be said than how a ramp differs from a hold"
+            said.append(f"{seen}: {nothing}, nor can viscous friction be told from Coulomb's")
         if "holds" not in self.present:
             of_leaks = "" if "peaks" in self.present else ", and the law of a leak is unsure"
             said.append(
@@ -128,7 +144,10 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     present = frozenset(word for word, is_there in found.items() if is_there)
     is_cycled = have_later_cycles(sessions, thresholds)
     is_unread = idle_s >= thresholds.settled_s and not found["rests"]
-    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled, is_unread)
+    is_held = hold_s >= thresholds.clear * thresholds.settled_s  # for longer than a load takes to turn
+    return Excitation(
+        tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled, is_unread, is_held
+    )
 
 
 class _Rise(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,13 +15,16 @@ from smartshoe.diagnosis._gains_and_zeros import changes_of, time_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
 from smartshoe.diagnosis._members import begun_with
+from smartshoe.diagnosis._ranges import rounded
 from smartshoe.diagnosis._result import Cause, NextExperiment
-from smartshoe.diagnosis._sensitivity import logged_channels
+from smartshoe.diagnosis._sensitivity import logged_words
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
 from smartshoe.protocol import Protocol
+from smartshoe.recording import Recording
+from smartshoe.signals.loading import ramps, rate_range
 
 SHOWN_BY: dict[Exposure, str] = {
     "rates": "rates",
@@ -41,6 +45,42 @@ def next_experiment(
     *,
     open_: bool,
     worse: bool = False,
+) -> NextExperiment | None:
+    """What to do next, where anything is open; of a protocol how high and how fast it loads, beside the recordings."""
+    told = _next(found, causes, sessions, excitation, open_=open_, worse=worse)
+    if told is None or told.steps is None:
+        return told
+    return replace(told, says=f"{told.says}; {_loads_of(told.steps, sessions, excitation.thresholds)}")
+
+
+def _loads_of(protocol: Protocol, sessions: Sequence[Session], thresholds: Thresholds) -> str:
+    """How high and how fast a protocol loads, and what it asks of a machine that was seen doing less."""
+    rate = protocol.peak_rate_n_per_s
+    asks = f"it loads to {rounded(protocol.peak_load_n)} N at up to {rounded(rate)} N/s"
+    recorded = max(_fastest_n_per_s(one.recording) for one in sessions)
+    if rate <= (1.0 + thresholds.same) * recorded:
+        return asks
+    return (
+        f"{asks}, faster than anything recorded (up to {rounded(recorded)} N/s): if the machine cannot, let its fast"
+        " ramps take longer, and expect it to tell less"
+    )
+
+
+def _fastest_n_per_s(recording: Recording) -> float:
+    """How fast a load was put on or taken off: over whole ramps, or by most of the way where they are in steps."""
+    time_s, load_n = recording.time_s, recording.force_n
+    by_way = (rate_range([(time_s, sign * load_n)])[1] for sign in (1.0, -1.0))
+    return max([*by_way, *(abs(one.rate_n_per_s) for one in ramps(time_s, load_n))])
+
+
+def _next(
+    found: Inference,
+    causes: Sequence[Cause],
+    sessions: Sequence[Session],
+    excitation: Excitation,
+    *,
+    open_: bool,
+    worse: bool,
 ) -> NextExperiment | None:
     """For the largest doubtful cause that any protocol tells from its nearest equivalent: the shortest such, a channel.
 
@@ -81,7 +121,8 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     """The shortest protocol that rules a cause's nearest equivalent out, or tells clearly more than this data.
 
     Of those that this data does not hold already, and of which its logger takes enough samples to tell anything. Where
-    none rules it out, the channel that would, if there is one.
+    none rules it out, the channel that would, if there is one. What is foretold is a unit of the cause: of another one
+    nothing is said.
     """
     rival = cause.equivalents[0]
     now = _contest(found, cause, rival)
@@ -100,25 +141,27 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
             if _rules_out(then, thresholds):
                 break
     names, both = (cause.name, *cause.equivalents), listed((cause.name, rival), "and")
+    no_use = f"if it is {in_words(cause.name)}, no protocol is expected to rule out {in_words(rival)}"
     chosen, word = _most_telling(now, foretold, thresholds), _channel(cause.name, rival, sessions)
     channel = None if word is None else in_words(word)
     if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
         most = max((then.margin - now.margin for _, then in foretold), default=0.0)
         lost = [name for name in (cause.name, rival) if effect(name).why_not_undone]
-        instead = "use either, they read too nearly alike"
+        instead = "use either for loads like those recorded, under which they read too nearly alike"
         if len(lost) == 1:
             why = effect(lost[0]).why_not_undone
-            instead = f"they read too nearly alike, but the {in_words(lost[0])} stays in the force, since {why}"
+            stays = f"the {in_words(lost[0])} stays in the force, since {why}"
+            instead = f"under loads like those recorded they read too nearly alike, but {stays}"
         if word is not None:
             instead = f"what would is {SAYS[word]}"
-        says = f"no protocol is expected to rule out either of {both}: {instead}"
+        says = f"{no_use}: {instead}"
         return NextExperiment(names, None, channel, says, most)
     protocol, then = chosen
     says = f"run the protocol {in_words(protocol.name)}: it should tell {both} apart, which this data does not"
     if not _rules_out(then, thresholds):
         says = (
-            f"run the protocol {in_words(protocol.name)}: it should tell more of {both} than this data does, though no"
-            " protocol is expected to rule out either"
+            f"run the protocol {in_words(protocol.name)}: it should tell more of {both} than this data does, though,"
+            f" {no_use}"
         )
     return NextExperiment(names, protocol.name, channel, says, then.margin - now.margin, protocol)
 
@@ -216,6 +259,5 @@ def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) ->
 
 def _channel(name: str, rival: str, sessions: Sequence[Session]) -> Exposure | None:
     """The channel that the catalogue says would tell them apart, if it was not logged already."""
-    columns = set.intersection(*({*one.recording.channels} for one in sessions))
-    lacking = (told_apart_by(effect(name), effect(rival)) & CHANNELS) - logged_channels(sessions) - columns
+    lacking = (told_apart_by(effect(name), effect(rival)) & CHANNELS) - logged_words(sessions)
     return min(lacking, default=None)

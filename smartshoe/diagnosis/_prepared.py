@@ -13,6 +13,7 @@ from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
+from smartshoe.diagnosis._sensitivity import logged_words
 from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.display import first_names
 from smartshoe.integrity import Integrity
@@ -63,7 +64,8 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         start = with_usual_arm(start)
     for added, values in clocks.parts:
         start = start.with_part(added, values)
-    excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
+    excitation = replace(excitation_of(sessions, thresholds), channels=logged_words(sessions))
+    ranges = ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
     limits = [

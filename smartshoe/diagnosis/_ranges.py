@@ -60,7 +60,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     if thresholds.clear * low > high and not any(within):
         trap = True
         said.append(
-            f"the load stays at {_told(low * scale.load_n)} to {_told(high * scale.load_n)} N throughout, and the"
+            f"the load stays at {rounded(low * scale.load_n)} to {rounded(high * scale.load_n)} N throughout, and the"
             " reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load it"
             " over its range)"
         )
@@ -106,8 +106,8 @@ def _flat_above(kept: Sequence[tuple[Array, Array]], scale: Scale, thresholds: T
     if float(load.max()) - begins < thresholds.same * float(np.ptp(load)) or first + 1 >= len(groups):
         return []
     return [
-        f"above {_told(begins * scale.load_n)} N the reading stands still, to {100.0 * thresholds.standing:g} % of its"
-        " span: no force can be told there, and none that is compensated is to be believed"
+        f"above {rounded(begins * scale.load_n)} N the reading stands still, to {100.0 * thresholds.standing:g} % of"
+        " its span: no force can be told there, and none that is compensated is to be believed"
     ]
 
 
@@ -181,7 +181,7 @@ def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) ->
     for does, unit, factor, of in ways:
         known, asked = (max((of(*one) for one in some), default=0.0) for some in (fitted, judged))
         if asked > (1.0 + thresholds.same) * known:
-            said.append(f"{does} {_told(asked * factor)} {unit} ({_told(known * factor)} in what was fitted)")
+            said.append(f"{does} {rounded(asked * factor)} {unit} ({rounded(known * factor)} in what was fitted)")
     there, asked_for = (
         excitation_of(some, thresholds).present - LATER_CYCLES - {"rates"}
         for some in (sessions, [replace(one, held_out=~one.held_out) for one in sessions])
@@ -192,7 +192,8 @@ def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) ->
     return "; ".join(parts) or None
 
 
-def _told(value: float) -> str:
+def rounded(value: float) -> str:
+    """A number to three digits, as a person writes it."""
     return f"{float(f'{value:.3g}'):,g}"
 
 

@@ -23,6 +23,7 @@ from smartshoe.diagnosis._session import Session, fitted_of, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family, origin_of
+from smartshoe.models.effects.exposure import CHANNELS
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.lags import lagged
 
@@ -88,6 +89,12 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
     logged = {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
     begin_apart = "temperature" in logged and any(s.conditions.begins_warmer_k for s in sessions)
     return logged | ({"temperatures"} if begin_apart else set())
+
+
+def logged_words(sessions: Sequence[Session]) -> frozenset[str]:
+    """`logged_channels`, and the columns that every recording has under such a word, of which no effect knows."""
+    columns = set.intersection(*({*one.recording.channels} for one in sessions))
+    return frozenset(logged_channels(sessions) | (CHANNELS & columns))
 
 
 def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) -> Array:

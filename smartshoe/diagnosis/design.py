@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from smartshoe.diagnosis._experiments import sessions_on
 from smartshoe.diagnosis._inference import can_validate
 from smartshoe.diagnosis._limits import ONE_CYCLE
 from smartshoe.diagnosis._naming import odds_of_law
-from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
+from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised, logged_words
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
+from smartshoe.models.effects import catalogue
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 
@@ -34,7 +35,8 @@ class Design:
     the reading, infinite where the baseline follows it whole. ``unlike`` (n, n): the share of an effect's evidence that
     another one in its place cannot follow. ``evidence``: -2 log of an effect that leaves ``strength`` (rms share of
     full scale) beyond what the baseline follows, for which `cannot_be_told` answers. ``limits``: what a diagnosis of
-    such recordings would say that they lack, whatever is in them.
+    such recordings would say that they lack, whatever is in them. ``left_out``: the channels that further effects need,
+    by name: a design is of load and reading alone.
     """
 
     names: tuple[str, ...]
@@ -44,6 +46,7 @@ class Design:
     evidence: float
     thresholds: Thresholds
     limits: tuple[str, ...] = ()
+    left_out: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     def cannot_be_told(self, name: str) -> tuple[str, ...]:
         """The effects that this protocol would not tell from ``name``, most alike first.
@@ -75,6 +78,7 @@ class Design:
                 if i != j
             ],
             "limits": list(self.limits),
+            "left_out": [{"effect": name, "needs": sorted(words)} for name, words in self.left_out.items()],
         }
 
 
@@ -106,7 +110,7 @@ def design(
     Raises
     ------
     UsageError
-        Without a protocol, where none bears a load, and for numbers that are not positive.
+        Without a protocol, where none bears a load or one is too short, and for numbers that are not positive.
     """
     if not protocols:
         raise UsageError("a design needs a protocol: give one at least")
@@ -119,17 +123,40 @@ def design(
         raise UsageError(
             f"no load is put on in {', '.join(one.name for one in protocols)}: give a protocol that presses"
         )
+    for protocol in protocols:
+        if said := too_short_of(protocol, sample_rate_hz, limits):
+            raise UsageError(said)
     sessions, factors = sessions_on(unit, protocols, peak_n, 1.0 / sample_rate_hz, limits)
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.
     sd = 0.01 * noise_percent / math.sqrt(min(factors))
     # Of one load cycle no cause is named, whatever its columns tell.
     lacking = [] if can_validate(sessions, limits) else [ONE_CYCLE]
-    lacking += replace(excitation_of(sessions, limits), is_judged=True).limits()
-    return replace(_compared(columns, sd, 0.01 * strength_percent, limits), limits=tuple(lacking))
+    excitation = replace(excitation_of(sessions, limits), is_judged=True)
+    lacking += excitation.limits()
+    hidden = frozenset(name for name, one in catalogue().items() if excitation.hides(one))
+    found = _compared(columns, sd, 0.01 * strength_percent, limits, hidden)
+    logged = logged_words(sessions)
+    left_out = {name: one.needs - logged for name, one in catalogue().items() if one.is_physical and one.needs - logged}
+    return replace(found, limits=tuple(lacking), left_out=left_out)
 
 
-def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:
+def too_short_of(protocol: Protocol, sample_rate_hz: float, thresholds: Thresholds | None = None) -> str | None:
+    """What is said of a protocol of which a log takes fewer samples than a diagnosis does with; None if it does not."""
+    samples, least = math.ceil(protocol.duration_s * sample_rate_hz), (thresholds or Thresholds()).least_samples
+    if samples >= least:
+        return None
+    return (
+        f"protocol {protocol.name} lasts {protocol.duration_s:g} s, of which a log of {sample_rate_hz:g} Hz takes"
+        f" {samples} sample{'' if samples == 1 else 's'}, and a diagnosis needs {least}: make it longer, or raise"
+        " the sample rate"
+    )
+
+
+def _compared(
+    columns: Linearised, sd: float, strength: float, limits: Thresholds, hidden: frozenset[str] = frozenset()
+) -> Design:
+    """``hidden``: effects of which the columns show what no unit does as exactly, and that count as never seen."""
     gram = columns.gram[1:, 1:] / sd**2
     own = np.arange(columns.own)
     left = gram - gram[:, own] @ np.linalg.pinv(gram[np.ix_(own, own)], rcond=1e-10, hermitian=True) @ gram[own]
@@ -145,14 +172,15 @@ def _compared(columns: Linearised, sd: float, strength: float, limits: Threshold
     of = {name: np.array([one.name == name for one in laws]) for name in names}
     for i, name in enumerate(names):
         shapes = of[name] & seen
-        if not shapes.any():
+        if name in hidden or not shapes.any():
             unlike[i] = 0.0
             continue
         # Of what the baseline does not follow it must also be material.
         x = float(powers[shapes].max())
         least[i] = max(math.sqrt(shown / x), limits.material / (sd * math.sqrt(x / count)))
         for j, other in enumerate(names):
-            unlike[i, j] = missed[np.ix_(of[other], shapes)].min() if j != i else 0.0
+            if other not in hidden:
+                unlike[i, j] = missed[np.ix_(of[other], shapes)].min() if j != i else 0.0
     return Design(names, least, unlike, strength, count * (strength / sd) ** 2, limits)
 
 

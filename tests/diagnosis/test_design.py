@@ -185,6 +185,81 @@ def test_a_design_says_what_a_diagnosis_of_such_recordings_would_lack(
     assert "limits of these protocols" in capsys.readouterr().out
 
 
+ONE_RATE = [dynamic_protocol((200,), repeats=6)]
+
+
+def _held(seconds: float) -> list[Protocol]:
+    """Six times to 800 N at 200 N/s, where the load stays for so long."""
+    corners = (("ramp", 800.0, 4.0), ("hold", 800.0, seconds), ("ramp", 0.0, 4.0), ("rest", 0.0, 5.0))
+    return [Protocol("held", (Segment("rest", 0.0, 5.0), *(Segment(*one) for one in corners * 6)))]  # type: ignore[arg-type]
+
+
+def test_at_one_rate_a_gain_that_goes_with_it_never_shows_unless_a_load_is_held() -> None:
+    """It is another gain there, but for corners, which thinned samples round: of 5 % nothing is found.
+
+    The table said 0.19 % above "nothing can be said of rate dependence"; beside holds it is found, and that was said.
+    """
+    told = design(ONE_RATE)
+    assert np.isinf(told.least[told.names.index("rate_gain")])
+    assert not any("rate_gain" in told.cannot_be_told(name) for name in told.names if name != "rate_gain")
+    assert any("nothing can be said of rate dependence" in said for said in told.limits)
+    held = design(_held(2.0))
+    assert held.least[held.names.index("rate_gain")] < 0.001
+    assert any("how a ramp differs from a hold" in said for said in held.limits)
+    assert np.isfinite(told.least[told.names.index("play_hysteresis")])  # which rates show too, and other things
+
+
+def test_a_design_tells_which_effects_it_leaves_out_and_what_they_need(
+    root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = design(ONE_RATE)
+    assert told.left_out == {"cross_talk": {"neighbour"}}
+    assert "cross_talk" not in told.names
+    assert told.to_dict()["left_out"] == [{"effect": "cross_talk", "needs": ["neighbour"]}]
+    assert run_command(["diagnose", "--design", str(root / "scenarios" / "calibration.toml")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "logged: cross talk needs the neighbouring unit's reading, logged" in said
+
+
+def test_a_protocol_of_which_a_log_takes_too_few_samples_is_refused_with_a_remedy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It ended in "p holds one sample", as if a file could not be read."""
+    text = '[protocol.p]\nkind = "segments"\ncorners = [[0, 0], [0.5, 10], [{0}, 0]]\n[[unit]]\nname = "toe"\n'
+    for last_s, samples in ((0.98, "98 samples"), (0.502, "51 samples")):
+        assert run_command(_asked(tmp_path, text.format(last_s))) == 2
+        said = capsys.readouterr().err
+        assert "asked.toml, line 1, key protocol.p: protocol p lasts" in said
+        assert f"of which a log of 100 Hz takes {samples}, and a diagnosis needs 100: make it longer" in said
+    assert run_command(_asked(tmp_path, text.format(1.0))) == 0
+    short = Protocol("short", (Segment("ramp", 10.0, 0.001), Segment("ramp", 0.0, 0.001)))
+    with pytest.raises(UsageError, match=r"protocol short lasts 0\.002 s, of which a log of 100 Hz takes 1 sample"):
+        design([*ONE_RATE, short])
+
+
+def test_a_design_refuses_what_the_simulated_machine_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = '[protocol.p]\nkind = "segments"\ncorners = [[0, 0], [5, {0}], [9, 0], [12, 0]]\n[[unit]]\nname = "toe"\n'
+    assert run_command(_asked(tmp_path, text.format(2001))) == 2
+    designed = capsys.readouterr().err
+    assert "asked.toml, line 1, key protocol.p: simulated Instron 5944 with toe" in designed
+    assert "the machine's limit is 2000 N: lower the load" in designed
+    assert not (tmp_path / "told.json").exists()
+    assert run_command(["simulate", str(tmp_path / "asked.toml"), "--out", str(tmp_path / "made")]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == designed.splitlines()[-1]
+    assert run_command(_asked(tmp_path, text.format(800))) == 0
+
+
+def test_a_proposed_protocol_alone_is_told_what_a_design_needs_beside_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(_asked(tmp_path, "[protocol.dynamic]\n")) == 2
+    said = capsys.readouterr().err
+    assert "asked.toml, key unit: there is none, and a design takes noise and rate from units: add [[unit]]" in said
+    assert run_command(_asked(tmp_path, '[machine]\nbackend = "sim:instron"\n')) == 2
+    said = capsys.readouterr().err
+    assert "key protocol: there is none, and a design asks about protocols: add a [protocol.dynamic], and [[" in said
+
+
 def test_the_command_names_the_file_and_key_where_there_is_no_protocol(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

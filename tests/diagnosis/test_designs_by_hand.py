@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from courses import course, pressed, triangles
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, _next_experiment
@@ -19,7 +20,8 @@ from smartshoe.diagnosis._experiments import run_on
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
-from smartshoe.diagnosis._next_experiment import _contest, _in_place_of, _is_of, next_experiment
+from smartshoe.diagnosis._next_experiment import _contest, _fastest_n_per_s, _in_place_of, _is_of, next_experiment
+from smartshoe.diagnosis._result import NextExperiment
 from smartshoe.diagnosis.design import Design, _compared, _not_followed, design
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.effects.exposure import SAYS
@@ -157,7 +159,8 @@ def test_a_design_is_of_commanded_loads_at_the_logs_rate_and_noise(monkeypatch: 
         seen["given"] = unit, sessions, limits
         return "columns"
 
-    def compared(columns: Any, sd: float, strength: float, limits: Any) -> Design:
+    def compared(columns: Any, sd: float, strength: float, limits: Any, hidden: frozenset[str]) -> Design:
+        assert hidden == set()  # a load is held
         seen["compared"] = columns, sd, strength, limits
         return _design(7.0)
 
@@ -245,7 +248,7 @@ class _Foretold:
         self.asked: list[str] = []
 
     def after(self, protocol: Any, sample_time_s: float, least: float, of_use: float) -> _Foretold | None:
-        assert sample_time_s == 0.005  # of the recording that was logged most quickly
+        assert sample_time_s == pytest.approx(0.005)  # of the recording that was logged most quickly
         assert of_use == min(2.0 * self.log_odds, ENDS)  # what comes to no more is never proposed
         self.asked.append(protocol.name)
         then = _Foretold(*self._then.get(protocol.name, (self.log_odds, self.margin)))
@@ -253,6 +256,12 @@ class _Foretold:
 
 
 ENDS = -math.log(0.3)  # log odds from which on a rival is no equivalent
+
+
+def _pressing(name: str, lasting_s: float, rate_n_per_s: float) -> Protocol:
+    """To 790 N at that rate, and off again as slowly as it lasts."""
+    up_s = 790.0 / rate_n_per_s
+    return Protocol(name, (Segment("ramp", 790.0, up_s), Segment("ramp", 0.0, lasting_s - up_s)))
 
 
 def _next(
@@ -264,25 +273,29 @@ def _next(
     own_gains: tuple[OwnGain, ...] = (),
     zero_changes: tuple[ZeroChange, ...] = (),
     channel: str | None = None,
+    rate_n_per_s: float = 320.0,
 ) -> Any:
     monkeypatch.setattr(_next_experiment, "_contest", lambda found, cause, rival: contests[cause.name])
     monkeypatch.setattr(_next_experiment, "_channel", lambda name, rival, sessions: channel)
     lasting = {"long_hold": 600.0, "steps": 50.0, "rates": 200.0}
-    made = {name: (lambda peak_n, name=name: SimpleNamespace(name=name, duration_s=lasting[name])) for name in lasting}
+    made = {name: (lambda peak_n, name=name: _pressing(name, lasting[name], rate_n_per_s)) for name in lasting}
     monkeypatch.setattr(_next_experiment, "EXPERIMENTS", made)
-    monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: "unseen")
+    unseen = NextExperiment((), "unseen", None, "unseen", None, _pressing("unseen", 50.0, rate_n_per_s))
+    monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: unseen)
     found: Any = SimpleNamespace(
         fit=SimpleNamespace(model=MODEL), can_validate=can_validate, own_gains=own_gains, zero_changes=zero_changes
     )
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
     sessions: list[Any] = [
-        SimpleNamespace(recording=SimpleNamespace(sample_time_s=step_s)) for step_s in (0.05, 0.005, 0.1)
+        SimpleNamespace(recording=pressed(triangles(), step_s=step_s)) for step_s in (0.05, 0.005, 0.1)
     ]
     return next_experiment(found, causes, sessions, excitation, open_=open_)
 
 
 LEAK = ("linear_leak", 0.02, ("orifice_leak", "zero_drift"))
 BOTH = "linear leak and orifice leak"
+LOADS = "it loads to 790 N at up to 320 N/s"
+NO_USE = "if it is linear leak, no protocol is expected to rule out orifice leak"
 
 
 def test_the_shortest_protocol_that_rules_the_nearest_equivalent_out_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -294,16 +307,29 @@ def test_the_shortest_protocol_that_rules_the_nearest_equivalent_out_is_run(monk
         assert contest.asked == asked  # those after it are not asked
         assert told.separates == ("linear_leak", "orifice_leak", "zero_drift")
         assert (told.protocol, told.channel, told.steps.name) == (protocol, "temperature", protocol)
-        assert (
-            told.says
-            == f"run the protocol {protocol.replace('_', ' ')}: it should tell {BOTH} apart, which this data does not"
-        )
+        name = protocol.replace("_", " ")
+        apart = f"run the protocol {name}: it should tell {BOTH} apart, which this data does not"
+        assert told.says == f"{apart}; {LOADS}"
     assert told.expected_margin == 1e4 - 5.0  # what it adds
     # What adds no more than noise does not count, however its odds come to be.
     bound = -2.0 * math.log(0.02)
     for by, protocol in ((0.999 * bound, "rates"), (1.001 * bound, "steps")):
         contest = _Foretold(1.1, 5.0, {"steps": (1.3, 5.0 + by), "rates": (1.3, 90.0)})
         assert _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest}).protocol == protocol
+
+
+def test_a_protocol_tells_how_fast_it_loads_and_where_no_recording_was_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    """800 N in 2.5 s at a sample every 20 ms: four times as fast at one every 5 ms, the fastest of all."""
+    ends = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (9.0, 90.0)})}
+    for rate_n_per_s, is_beyond in ((1580.0, False), (1620.0, True), (4990.0, True)):
+        said = _next(monkeypatch, [_cause(*LEAK)], ends, rate_n_per_s=rate_n_per_s).says
+        beyond = ", faster than anything recorded (up to 1,280 N/s): if the machine cannot, let its fast ramps take"
+        assert f"it loads to 790 N at up to {rate_n_per_s:,.0f} N/s" in said
+        assert (beyond in said) is is_beyond
+    only_falls = np.concatenate([np.zeros(50), np.linspace(0.0, 1.0, 500), np.linspace(1.0, 0.0, 50), np.zeros(50)])
+    stairs = course(*[corner for k in range(8) for corner in ((10, 0.1 * (k + 1)), (300, 0.1 * (k + 1)))])
+    for load, recorded in ((only_falls, 816.3), (stairs, 400.0), (0.0 * stairs, 0.0)):
+        assert _fastest_n_per_s(pressed(load)) == pytest.approx(recorded, rel=0.03)
 
 
 def test_where_none_ends_the_doubt_the_shortest_that_tells_about_as_much_as_the_best(
@@ -322,21 +348,21 @@ def test_where_none_ends_the_doubt_the_shortest_that_tells_about_as_much_as_the_
         told = _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest})
         assert (told.protocol, told.steps.name) == (protocol, protocol)
         assert told.says.startswith(f"run the protocol {protocol}: it should tell more of {BOTH} than this data does")
-        assert told.says.endswith("no protocol is expected to rule out either")
+        assert told.says.endswith(f"though, {NO_USE}; {LOADS}")
 
 
 def test_what_no_protocol_tells_better_asks_for_a_channel_or_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     contests = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (0.199, 90.0), "rates": (0.1, 40.0)})}
     told = _next(monkeypatch, [_cause(*LEAK)], contests)
     assert (told.protocol, told.channel, told.expected_margin, told.steps) == (None, None, 85.0, None)
-    no_use = f"no protocol is expected to rule out either of {BOTH}: "
-    assert told.says == no_use + "use either, they read too nearly alike"
+    # Nothing is said of what would be read if it were the other one, which nobody simulated.
+    assert told.says == f"{NO_USE}: use either for loads like those recorded, under which they read too nearly alike"
     clip = _cause("sensor_nonlinearity", 0.3, ("saturation",), ())
     told = _next(monkeypatch, [clip], {"sensor_nonlinearity": contests["linear_leak"]})
-    assert told.says.endswith("alike, but the saturation stays in the force, since what was clipped is lost")
+    assert told.says.endswith("nearly alike, but the saturation stays in the force, since what was clipped is lost")
     told = _next(monkeypatch, [_cause(*LEAK)], contests, channel="pressure_reference")
     assert (told.protocol, told.channel) == (None, "pressure reference")
-    assert told.says == no_use + f"what would is {SAYS['pressure_reference']}"
+    assert told.says == f"{NO_USE}: what would is {SAYS['pressure_reference']}"
     # What tells a little more by no means rules out: a channel that the catalogue knows does.
     contests = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (0.9, 90.0)})}
     assert _next(monkeypatch, [_cause(*LEAK)], contests).protocol == "steps"
@@ -355,8 +381,8 @@ def test_of_several_doubtful_causes_the_largest_that_a_protocol_tells(monkeypatc
     assert _next(monkeypatch, [small, large], both).separates[0] == "linear_leak"
     # "Use either" is no advice where more is left than that, or a name is not sure.
     unsure = _cause("zero_drift", 0.001, (), confidence=0.74)
-    assert _next(monkeypatch, [small, large, unsure], both) == "unseen"
-    assert _next(monkeypatch, [small, large], both, open_=True) == "unseen"
+    assert _next(monkeypatch, [small, large, unsure], both).says == f"unseen; {LOADS}"
+    assert _next(monkeypatch, [small, large], both, open_=True).says == f"unseen; {LOADS}"
     assert _next(monkeypatch, [small, large], both, open_=True, channel="temperature").channel == "temperature"
 
 
@@ -381,12 +407,12 @@ def test_a_protocol_that_the_data_holds_is_of_one_shape_and_length() -> None:
 def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
     sure, elsewhere = _cause("linear_leak", 0.02, ()), _cause("zero_offset", 0.02, ("load_cell_tare",), part=None)
     assert _next(monkeypatch, [sure], {}) is None
-    assert _next(monkeypatch, [sure], {}, open_=True) == "unseen"
-    assert _next(monkeypatch, [_cause("linear_leak", 0.02, (), confidence=0.74)], {}) == "unseen"  # it is not sure
+    assert _next(monkeypatch, [sure], {}, open_=True).says == f"unseen; {LOADS}"
+    assert _next(monkeypatch, [_cause("linear_leak", 0.02, (), confidence=0.74)], {}).says == f"unseen; {LOADS}"
     once = _next(monkeypatch, [], {}, can_validate=False)  # nothing can be told of a single load cycle
     assert (once.separates, once.protocol, once.steps) == ((), "repeat", None)
     assert once.says.startswith("repeat the load cycle")
-    assert _next(monkeypatch, [sure, elsewhere], {}) == "unseen"  # a zero that is no part of the model
+    assert _next(monkeypatch, [sure, elsewhere], {}).says == f"unseen; {LOADS}"  # a zero that is no part of the model
     assert _next(monkeypatch, [], {}) is None
 
 

@@ -15,6 +15,7 @@ from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
 from smartshoe.diagnosis._causes import _against, _held_out_evidence, cause_of, zero_cause_of
 from smartshoe.diagnosis._diagnose import _outside, _refused
+from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, own_of
 from smartshoe.diagnosis._limits import refusals_of
 from smartshoe.diagnosis._naming import confidence_of
@@ -269,6 +270,7 @@ def _told(
     kind: float = 0.9,
     alternatives: Any = (),
     equivalents: tuple[str, ...] = ("orifice_leak",),
+    channels: frozenset[str] = frozenset(),
 ) -> Any:
     asked: list[Any] = []
 
@@ -301,7 +303,7 @@ def _told(
         is_sure=is_sure,
         by=by,
     )
-    excitation: Any = SimpleNamespace(present=present)
+    excitation = Excitation((0.1,), (1.0,), 1, present, STANDARD, channels=channels)
     found: Any = SimpleNamespace(fit="fit", alone=alone)
     cause = cause_of(name, found, "fine", AFTER, SCALE, excitation, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]
@@ -343,6 +345,8 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
         "what would show it best is missing: loads held for some seconds, at several levels; rests without load"
         " between loads"
     )
+    logged = _told(monkeypatch, frozenset(), kind_only=True, channels=exposed).evidence[-1]
+    assert logged.statistic == "kind"  # what is logged is as good as what the load holds
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.9, STANDARD.least_confidence)
     assert kind.says == (

@@ -435,7 +435,11 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
     every = frozenset({"holds", "rests", "repeats"})
     rich = Excitation((0.1, 0.5), (0.5, 1.0), 2, every, STANDARD)
     for changes, words in (
-        ({"rates_per_s": (0.1,)}, "one loading rate only"),
+        ({"rates_per_s": (0.1,)}, "one loading rate only: nothing can be said of rate dependence, nor can viscous"),
+        (
+            {"rates_per_s": (0.1,), "is_held": True},
+            "one loading rate only: of rate dependence no more can be said than how a ramp differs from a hold, nor",
+        ),
         (
             {"present": every - {"holds"}},
             "no hold longer than 3 s under load: slow creep is not seen, and the law of a leak",

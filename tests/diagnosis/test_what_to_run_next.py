@@ -17,7 +17,10 @@ from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
+from smartshoe.diagnosis._prepared import prepared as made_ready
 from smartshoe.diagnosis._ranges import ranges_of
+from smartshoe.diagnosis._sensitivity import logged_words
+from smartshoe.integrity import examine
 from smartshoe.models.effects import effect
 from smartshoe.models.effects.exposure import SAYS, Exposure
 
@@ -192,11 +195,14 @@ def test_a_channel_that_tells_two_apart_is_asked_for_unless_it_is_logged(
     plain, _ = prepared(pressed(load))
     assert _channel(*pair, plain) == channel
     assert _channel("delay", "sensor_lag", plain) is None
+    assert channel not in logged_words(plain)
     columns = {name: value + 0.0 * load for name, value in logged.items()}
     more = Recording.from_arrays(
         time_s=STEP_S * np.arange(load.size), force_n=800.0 * load, pressure_mbar=140.0 * load, **columns
     )
     assert _channel(*pair, prepared(more)[0]) is None
+    # Nor does a cause of such loads lack it.
+    assert channel in made_ready([more], 1, examine([more], STANDARD), STANDARD).excitation.channels
 
 
 def test_a_rival_is_fitted_in_the_place_of_an_effect() -> None:

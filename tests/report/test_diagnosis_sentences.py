@@ -19,6 +19,7 @@ from smartshoe.models.effects import effect, listed, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
+    FORCE_MAY_BE_OFF,
     Row,
     comparison,
     gain_sentence,
@@ -186,7 +187,10 @@ def test_a_force_that_the_extended_model_gives_back_worse_is_the_baselines() -> 
     with_zero = BASELINE.with_part(effect("zero_offset"), np.array([0.01]))  # so that it gives readings as logged
     for plain_model in (BASELINE, with_zero):
         assert row(plain_model).before == own.before
-        assert (row(plain_model).after, row(plain_model).change) == ("by the baseline, see the limits", "")
+        assert (row(plain_model).after, row(plain_model).change) == (
+            f"by the baseline: see {FORCE_MAY_BE_OFF}",
+            "",
+        )
     # One effect is passed over and others are undone: it is no baseline, and its error is that of the result.
     assert row(with_zero.with_part(*LEAK)) == own
 

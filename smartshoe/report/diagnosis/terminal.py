@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -12,7 +12,9 @@ from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.design import Design
 from smartshoe.display import sure
 from smartshoe.models.effects import in_words, listed
+from smartshoe.models.effects.exposure import SAYS
 from smartshoe.report.diagnosis._sentences import (
+    FORCE_MAY_BE_OFF,
     LIKELIHOOD,
     comparison,
     fault_text,
@@ -61,7 +63,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
     of_the_force = diagnosis.limits_of_the_force
     others = [one for one in diagnosis.limits_of_the_rest if one not in of_the_force]
-    _several(console, "where the calibration's force may be off", of_the_force, most=None)
+    _several(console, FORCE_MAY_BE_OFF, of_the_force, most=None)
     _several(console, "limits of this data", others, most=None)
     _several(console, "recordings that were left out", diagnosis.left_out)
     if diagnosis.next_experiment is not None:
@@ -84,7 +86,16 @@ def print_design(design: Design) -> None:
         "the last column names what would follow an effect as well in its place; where the row of one that is named"
         " does not name it back, it cannot follow all that the other does",
     )
+    if design.left_out:
+        said = "; ".join(f"{in_words(name)} needs {_channels(words)}" for name, words in design.left_out.items())
+        _line(console, f"left out, since load and reading are all that is taken to be logged: {said}")
     _several(console, "limits of these protocols", design.limits, most=None)
+
+
+def _channels(words: Collection[str]) -> str:
+    """What must be logged, by the words of the catalogue; those of another package's own as they are."""
+    said = {str(word): text for word, text in SAYS.items()}
+    return " and ".join(said.get(word, word) for word in sorted(words))
 
 
 def _causes(console: Console, diagnosis: Diagnosis) -> None:

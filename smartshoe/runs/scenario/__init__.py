@@ -4,6 +4,7 @@ from smartshoe.runs.scenario._keys import Tables, parse_assignments, with_values
 from smartshoe.runs.scenario._run import (
     ScenarioResult,
     UnitResult,
+    check_machines,
     check_simulated,
     noise_of,
     protocols_of,
@@ -27,6 +28,7 @@ __all__ = [
     "Scenario",
     "ScenarioResult",
     "UnitResult",
+    "check_machines",
     "check_simulated",
     "checked",
     "load",

@@ -202,15 +202,20 @@ def check_simulated(scenario: Scenario, source: ScenarioText) -> None:
     So a misspelt option is reported before the first experiment. Devices that are not simulated are left alone. Raises
     `ScenarioError`, which points into the scenario.
     """
+    check_machines(scenario, source)
+    if scenario.trial is not None and scenario.trial.shoe.startswith("sim:"):
+        with opened_shoe(scenario, source, scenario.seed):
+            pass
+
+
+def check_machines(scenario: Scenario, source: ScenarioText) -> None:
+    """The same of the machines alone, for what is reckoned with their protocols."""
     protocols = protocols_of(scenario, source)
     if scenario.machine.backend.startswith("sim:"):
         for index, unit in enumerate(scenario.unit):
             if not unit.recordings:
                 with _machine_of(scenario, source, index) as machine:
                     _check_protocols(machine, protocols, source)
-    if scenario.trial is not None and scenario.trial.shoe.startswith("sim:"):
-        with opened_shoe(scenario, source, scenario.seed):
-            pass
 
 
 def _beside(source: ScenarioText, options: dict[str, Any]) -> dict[str, Any]:
