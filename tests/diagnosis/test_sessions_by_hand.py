@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from courses import course
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import norm
 
@@ -17,7 +19,7 @@ from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._prepared import prepared
-from smartshoe.diagnosis._scale import Scale, full_scale, lowest, thinning
+from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, lowest, thinning
 from smartshoe.diagnosis._session import (
     Session,
     _cycles,
@@ -157,6 +159,19 @@ def test_of_a_ramp_of_few_samples_a_sixth_part_of_what_keeps_its_shape_stays(sam
     load = np.resize(course((samples, 1.0), (samples, 0.0)), 45_000 // samples * samples)
     most = -(-load.size // 12_000)
     assert thinning([_run(load)], SCALE, STANDARD) == [min(factor, most)]
+
+
+@given(st.lists(st.tuples(st.integers(1, 100_000), st.integers(1, 6)), min_size=1, max_size=6))
+def test_of_long_recordings_as_much_is_fitted_of_each_and_short_ones_stay_whole(made: list[tuple[int, int]]) -> None:
+    """Together no more than 72,000 samples as they are thinned; thinned further, quick loads are told as a delay."""
+    runs: list[Any] = [range(count) for count, _ in made]
+    factors = [factor for _, factor in made]
+    lengths = fitted_lengths(runs, factors)
+    left = [length / factor for length, factor in zip(lengths, factors, strict=True)]
+    cut = [one for one, length, run in zip(left, lengths, runs, strict=True) if length < len(run)]
+    assert all(0 < length <= len(run) for length, run in zip(lengths, runs, strict=True))
+    assert sum(left) <= 72_000 + len(made)
+    assert not cut or (sum(left) >= 72_000 - 1e-6 and max(left) <= min(cut) + 1.0)
 
 
 @pytest.mark.parametrize("low", [0.9, 0.5, 0.1, 0.0])
