@@ -48,7 +48,8 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     clocks = aligned(recordings, integrity)
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
-    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
+    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
+    following = as_they_follow(clocks.recordings[:count], None if is_moved else integrity.one_clock)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds, following)
     held = held_out if any(held_out) else None
     factors = thinning(clocks.recordings[:count], scale, thresholds)
@@ -73,5 +74,4 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     ]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
     return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)
