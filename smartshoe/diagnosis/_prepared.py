@@ -13,7 +13,8 @@ from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
-from smartshoe.diagnosis._session import Session, at_full_rate, prepare
+from smartshoe.diagnosis._session import Session, at_full_rate, longest_step_s, prepare
+from smartshoe.diagnosis._slow_stretches import too_slow_of
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
@@ -65,9 +66,14 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
+    slow = (
+        too_slow_of(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
+        for one, mask in zip(sessions, clocks.usable, strict=True)
+    )
     limits = [
         *said_of_neighbours,
         *clocks.says,
+        *(said for said in slow if said is not None),
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
         *excitation.limits(),
