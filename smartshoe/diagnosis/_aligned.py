@@ -7,7 +7,7 @@ A lag or a drift that all recordings share is a cause like any other, and the mo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,33 +34,42 @@ class Aligned:
 
 
 def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
-    """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own."""
+    """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own.
+
+    One that only judges, and goes by another clock than the model bears, is moved to that one.
+    """
     places = [k for k, mask in enumerate(integrity.usable) if mask.any()]
-    recordings, masks = [recordings[k] for k in places], [integrity.usable[k] for k in places]
-    lags, rates = (np.array(one)[places] for one in (integrity.clock_offset_s, integrity.clock_rate))
-    plain = Aligned(recordings, masks, (), (), places)
-    if not lags.any() and not rates.any():
-        return plain
+    lags, rates = integrity.clock_offset_s, integrity.clock_rate
     delay, drift = between_clocks("lag"), between_clocks("rate")
     shared = integrity.one_clock
-    if shared is not None and abs(shared.before_s) < delay.parameters[0].upper:
-        late, parting = (delay, np.array([shared.before_s])), (drift, np.array([shared.rate]))
-        known = [mask & _is_load_known(one, shared) for one, mask in zip(recordings, masks, strict=True)]
-        return replace(plain, usable=known, parts=(parting, late) if shared.rate else (late,))
+    is_told = any(lags[k] or rates[k] for k in places if k not in integrity.others)
+    borne = shared if is_told and shared is not None and abs(shared.before_s) < delay.parameters[0].upper else None
     made, usable, says, moved = [], [], [], []
-    for place, recording, mask, offset_s, rate in zip(places, recordings, masks, lags, rates, strict=True):
+    for place in places:
+        recording, mask, offset_s, rate = recordings[place], integrity.usable[place], lags[place], rates[place]
+        if borne is not None:
+            offset_s, rate = (
+                (offset_s - borne.before_s - 0.5 * borne.rate * recording.duration_s, rate - borne.rate)
+                if place in integrity.others
+                else (0.0, 0.0)
+            )
         if offset_s or rate:
             moved.append(place)
             recording, mask = _on_one_clock(recording, mask, float(offset_s), float(rate))
             way = "earlier" if offset_s > 0 else "later"
+            by = f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}"
             says.append(
-                f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}"
-                " to the load's clock before anything else: nothing is said of delays in it, and if it is the unit that"
-                " is late, the force of a calibration is as late"
+                f"{by} to the clock of the recordings that are fitted, before it judges"
+                if place in integrity.others
+                else f"{by} to the load's clock before anything else: nothing is said of delays in it, and if it is the"
+                " unit that is late, the force of a calibration is as late"
             )
         made.append(recording)
-        usable.append(mask)
-    return Aligned(made, usable, (), tuple(says), places, frozenset(moved))
+        usable.append(mask if borne is None else mask & _is_load_known(recording, borne))
+    if borne is None:
+        return Aligned(made, usable, (), tuple(says), places, frozenset(moved))
+    late, parting = (delay, np.array([borne.before_s])), (drift, np.array([borne.rate]))
+    return Aligned(made, usable, (parting, late) if borne.rate else (late,), tuple(says), places, frozenset(moved))
 
 
 def as_they_follow(recordings: Sequence[Recording], shared: OneClock | None) -> list[Recording]:

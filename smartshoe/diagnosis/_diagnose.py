@@ -61,7 +61,7 @@ def diagnose(
     everything, count = [*fitted, *kept_out], len(fitted)
     unit_of(everything, "diagnose")
     decided = decided_by(thresholds, material)
-    integrity, shared = examine(everything, decided), twins(everything, decided)
+    integrity, shared = examine(everything, decided, count), twins(everything, decided)
     everything = [*integrity.recordings]
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
     alone = [mask & ~shared[k].at if k in shared else mask for k, mask in enumerate(integrity.usable)]

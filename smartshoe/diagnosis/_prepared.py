@@ -14,7 +14,8 @@ from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import logged_words
-from smartshoe.diagnosis._session import Session, at_full_rate, prepare
+from smartshoe.diagnosis._session import Session, at_full_rate, longest_step_s, prepare
+from smartshoe.diagnosis._slow_stretches import too_slow_of
 from smartshoe.display import first_names
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
@@ -50,7 +51,8 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     clocks = aligned(recordings, integrity)
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
-    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
+    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
+    following = as_they_follow(clocks.recordings[:count], None if is_moved else integrity.one_clock)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds, following)
     held = held_out if any(held_out) else None
     factors = thinning(clocks.recordings[:count], scale, thresholds)
@@ -68,17 +70,21 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     ranges = ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
+    slow = (
+        too_slow_of(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
+        for one, mask in zip(sessions, clocks.usable, strict=True)
+    )
     limits = [
         *said_of_neighbours,
         *clocks.says,
         *said_of_length,
+        *(said for said in slow if said is not None),
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
         *excitation.limits(),
     ]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
     return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)
 
 

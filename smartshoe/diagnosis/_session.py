@@ -21,6 +21,7 @@ from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
 from smartshoe.diagnosis._neighbours import neighbours_of
 from smartshoe.diagnosis._scale import Scale, reading_in
+from smartshoe.diagnosis._slow_stretches import between_samples
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects.cycle_conditioning import half_way
@@ -202,7 +203,10 @@ def _session(
     thresholds: Thresholds,
     like: Session | None = None,
 ) -> Session:
-    logged, step_s = _logged(recording, usable, scale), recording.sample_time_s
+    step_s = recording.sample_time_s
+    logged = _logged(
+        recording, usable, scale, longest_step_s(recording, factor if like is None else like.thinned), thresholds
+    )
     reading = scale.share(logged.reading)
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
     weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), reading.size))
@@ -264,7 +268,12 @@ class _Logged:
     beside: dict[str, Array]
 
 
-def _logged(recording: Recording, usable: Mask, scale: Scale) -> _Logged:
+def longest_step_s(recording: Recording, factor: int) -> float:
+    """How far samples may be apart for fits of a recording thinned by a ``factor``, in which the average is as wide."""
+    return (max(factor, LEAST_WINDOW) + 0.5) * recording.sample_time_s  # half a sample, since stamps are rounded
+
+
+def _logged(recording: Recording, usable: Mask, scale: Scale, longest_s: float, thresholds: Thresholds) -> _Logged:
     time_s, step_s = recording.time_s - recording.time_s[0], recording.sample_time_s
     known = recording.load.present
     good = usable & recording.sensor.present & known
@@ -276,12 +285,14 @@ def _logged(recording: Recording, usable: Mask, scale: Scale) -> _Logged:
     even = np.asarray(step_s * np.arange(int(time_s[-1] / step_s) + 1), dtype=np.float64)
     nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
     is_near = np.abs(time_s[nearest] - even) < step_s
+    followed = (between_samples(time_s, even, one, longest_s, thresholds)[0] for one in (good, known))
+    good, known = (one[nearest] & is_near | more for one, more in zip((good, known), followed, strict=True))
     return _Logged(
         even,
         np.interp(even, time_s, load_n),
         np.interp(even, time_s, reading),
-        good[nearest] & is_near,
-        known[nearest] & is_near,
+        good,
+        known,
         {name: np.interp(even, time_s, values) for name, values in beside.items()},
     )
 

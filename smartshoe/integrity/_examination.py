@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from smartshoe.arrays import Mask
 from smartshoe.display import first_names
 from smartshoe.errors import InputError
-from smartshoe.integrity._apart import apart_s
-from smartshoe.integrity._clocks import UNSEEN, Lags, align, from_two_clocks, one_clock, two_clocks
+from smartshoe.integrity._clocks import align, from_two_clocks, one_clock, two_clocks
 from smartshoe.integrity._dropouts import dropouts, load_dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity, OneClock
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
@@ -19,6 +18,7 @@ from smartshoe.integrity._held import held_samples
 from smartshoe.integrity._held_rate import without_held
 from smartshoe.integrity._hum import hum
 from smartshoe.integrity._interpolated import without_interpolated
+from smartshoe.integrity._own_clocks import Alone, clocks_of
 from smartshoe.integrity._quantisation import quantisation
 from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
@@ -67,13 +67,11 @@ class _Tamed:
 
 @dataclass(frozen=True, eq=False)
 class _Examined:
-    """What was found in one recording, its ``usable`` samples (n,), its clock as in `Integrity`, lags that are seen."""
+    """What was found in one recording, its ``usable`` samples (n,), and what it tells of its clocks ``alone``."""
 
     findings: list[Finding]
     usable: Mask
-    offset_s: float = 0.0
-    rate: float = 0.0
-    lags: Lags = UNSEEN
+    alone: Alone = field(default_factory=Alone)
 
     @property
     def is_against(self) -> bool:
@@ -81,9 +79,12 @@ class _Examined:
         return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in self.findings)
 
 
-def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
+def examine(
+    recordings: Sequence[Recording], thresholds: Thresholds | None = None, count: int | None = None
+) -> Integrity:
     """What is wrong with the data of ``recordings``, before any model; deterministic.
 
+    The first ``count`` are fitted, or all; what the others show of the clocks changes nothing of these.
     Each recording has one reference load and one reading; where it has not, that is its refusal, whatever the others
     are. Raises `InputError` where there is no recording at all, `UsageError` for ``thresholds`` that are none.
     """
@@ -91,17 +92,16 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         raise InputError("there is no recording to examine: give at least one file")
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
-    examined = _examined_together(tamed, decided)
+    count = len(tamed) if count is None else count
+    examined = _examined_together(tamed, decided, count)
     refused = [_refusal(tame.recording, one, decided) for tame, one in zip(tamed, examined, strict=True)]
     usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
-    shared = one_clock([one.lags for one, mask in zip(examined, usable, strict=True) if mask.any()], decided)
     put_right = [_put_right(*one, decided) for one in zip(tamed, examined, usable, strict=True)]
-    offsets_s = [one.offset_s for one in examined]
-    if not any(one.offset_s or one.rate for one in examined):
-        apart = apart_s([recording for recording, _ in put_right], usable, [one.lags for one in examined], decided)
-        for place, lag_s in apart.items():
-            shared, offsets_s[place] = None, lag_s
-            put_right[place][1].append(from_two_clocks(put_right[place][0], lag_s, "than in the other recordings"))
+    clocks = clocks_of([one for one, _ in put_right], usable, [one.alone for one in examined], count, decided)
+    for place, lag_s in clocks.found.items():
+        recording, findings = put_right[place]
+        findings[:] = [one for one in findings if one.kind != "two_clocks"]
+        findings.append(from_two_clocks(recording, lag_s, "than in the other recordings"))
     return Integrity(
         tuple(recording for recording, _ in put_right),
         tuple(
@@ -110,21 +110,25 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
             for finding in findings
         ),
         tuple(usable),
-        tuple(offsets_s),
-        tuple(one.rate for one in examined),
-        shared,
+        clocks.offsets_s,
+        tuple(one.alone.rate for one in examined),
+        clocks.shared,
         tuple(why for why in refused if why is not None),
+        clocks.others,
     )
 
 
-def _examined_together(tamed: Sequence[_Tamed], thresholds: Thresholds) -> list[_Examined]:
-    """What was found in each recording, by all that the others tell of the sensor's ends and of the clocks."""
+def _examined_together(tamed: Sequence[_Tamed], thresholds: Thresholds, count: int) -> list[_Examined]:
+    """What was found in each recording, by all that the others tell of the sensor's ends and of the clocks.
+
+    Of the clocks only the first ``count`` tell, which are fitted.
+    """
     examined = [_examined(one, thresholds) for one in tamed]
     ends = _ends_told_by([finding for one in examined for finding in one.findings])
     if ends.dropouts.size + ends.rails.size and len(tamed) > 1:
         examined = [_examined(one, thresholds, ends) for one in tamed]
-    with_load = [one.lags for one in examined if not one.is_against]
-    if len(with_load) == len(examined) or (theirs := one_clock(with_load, thresholds)) is None:
+    with_load = [one.alone.lags for one in examined[:count] if not one.is_against]
+    if not any(one.is_against for one in examined) or (theirs := one_clock(with_load, thresholds)) is None:
         return examined
     return [
         _as_others_follow(tame, one, theirs, thresholds, ends) if one.is_against else one
@@ -182,9 +186,11 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
+    whole = np.ones(len(recording), dtype=bool)
     if (lacking := _lacking(recording)) is not None:
-        fatal = Finding.fatal("no_reference", np.ones(len(recording), dtype=bool), lacking)
-        return _Examined([*findings, fatal], usable)
+        return _Examined([*findings, Finding.fatal("no_reference", whole, lacking)], usable)
+    if (too_large := _beyond_sums(recording)) is not None:
+        return _Examined([*findings, Finding.fatal("does_not_follow_load", whole, too_large)], usable)
     view = _view(tame.recording, thresholds, ends)
     if view is None:
         says = "load and reading are hardly ever there at the same time: record them together"
@@ -200,7 +206,7 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
                 usable &= ~finding.cut_off
         if any(finding.severity == "fatal" for finding in findings):
             break
-    return _Examined(findings, usable, view.offset_s, view.rate, seen)
+    return _Examined(findings, usable, Alone(view.offset_s, view.rate, seen))
 
 
 def _as_others_follow(tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, ends: Ends) -> _Examined:
@@ -209,7 +215,8 @@ def _as_others_follow(tame: _Tamed, mine: _Examined, theirs: OneClock, threshold
     A reading that is late by half a period of its load seems to fall as the load rises.
     """
     over = _examined(tame, thresholds, ends, turned=True)
-    is_theirs = over.lags.are_of(theirs, thresholds) and over.lags.off_from_s(theirs) < mine.lags.off_from_s(theirs)
+    turned, as_it_was = over.alone.lags, mine.alone.lags
+    is_theirs = turned.are_of(theirs, thresholds) and turned.off_from_s(theirs) < as_it_was.off_from_s(theirs)
     return over if is_theirs and not over.is_against else mine
 
 
@@ -230,6 +237,15 @@ def _lacking(recording: Recording) -> str | None:
     if len(readings) > 1:
         return f"there are {len(readings)} readings ({first_names(readings)}): name one with --sensor"
     return None if readings else f"there is no reading: name its column with --sensor{among}"
+
+
+def _beyond_sums(recording: Recording) -> str | None:
+    """Why nothing can be computed of numbers so large that no number is their sum, or None."""
+    for channel in (recording.load, recording.sensor):
+        largest = float(np.max(np.abs(channel.values), initial=0.0))
+        if not largest < np.finfo(float).max / len(recording) or not np.all(np.isfinite(channel.si)):
+            return f"{channel.name} holds numbers up to {largest:.2g}, which are no measurements: give another unit"
+    return None
 
 
 def _view(recording: Recording, thresholds: Thresholds, ends: Ends) -> View | None:

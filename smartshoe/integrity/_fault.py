@@ -91,8 +91,9 @@ class Integrity:
     ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
     held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
     recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``one_clock`` is what all of
-    them share, where one pair of clocks accounts for how late their readings follow. ``refusals`` says in a sentence
-    each, in their order, why the recordings without a usable sample are of no use.
+    them share that are fitted, where one pair of clocks accounts for how late their readings follow; ``others`` are
+    the places of recordings that only judge, and go by other clocks. ``refusals`` says in a sentence each, in their
+    order, why the recordings without a usable sample are of no use.
     """
 
     recordings: tuple[Recording, ...]
@@ -102,3 +103,4 @@ class Integrity:
     clock_rate: tuple[float, ...]
     one_clock: OneClock | None
     refusals: tuple[str, ...]
+    others: frozenset[int] = frozenset()

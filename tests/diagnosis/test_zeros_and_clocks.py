@@ -298,7 +298,9 @@ def _told(
     offset_s: tuple[float, ...], rate: tuple[float, ...], runs: list[Recording], shared: OneClock | None = None
 ) -> Any:
     usable = tuple(one.sensor.present for one in runs)
-    integrity: Any = SimpleNamespace(clock_offset_s=offset_s, clock_rate=rate, one_clock=shared, usable=usable)
+    integrity: Any = SimpleNamespace(
+        clock_offset_s=offset_s, clock_rate=rate, one_clock=shared, usable=usable, others=frozenset()
+    )
     return aligned(runs, integrity)
 
 
@@ -338,7 +340,9 @@ def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
     masks = [one.sensor.present.copy() for one in runs]
     masks[0][500:520] = False
     lags_s = (0.6, 0.0)
-    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0, 0.0), one_clock=None, usable=tuple(masks))
+    integrity: Any = SimpleNamespace(
+        clock_offset_s=lags_s, clock_rate=(0.0, 0.0), one_clock=None, usable=tuple(masks), others=frozenset()
+    )
     lost = np.flatnonzero(~aligned(runs, integrity).usable[0][:1400])
     assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
     assert lost.size == pytest.approx(20, abs=1)

@@ -12,9 +12,11 @@ from scipy.signal import lfilter
 from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
-from smartshoe.integrity import examine
-from smartshoe.integrity._apart import apart_s
+from smartshoe.diagnosis._aligned import aligned
+from smartshoe.integrity import Integrity, OneClock, examine
+from smartshoe.integrity._apart import Told, apart_s
 from smartshoe.integrity._clocks import UNSEEN, Lags
+from smartshoe.integrity._own_clocks import Alone, clocks_of
 
 Array = NDArray[np.float64]
 
@@ -41,8 +43,14 @@ def _run(late_s: float, seed: int, *, sign: float = 1.0, noise: float = 0.1) -> 
     )
 
 
-def _apart(*runs: Recording, lags: tuple[Lags, ...] | None = None) -> dict[int, float]:
-    return apart_s(runs, [one.sensor.present for one in runs], lags or (UNSEEN,) * len(runs), STANDARD)
+def _apart(
+    *runs: Recording,
+    lags: tuple[Lags, ...] | None = None,
+    own_s: dict[int, float] | None = None,
+    fitted: int | None = None,
+) -> dict[int, float]:
+    told = Told(own_s or {}, None, len(runs) if fitted is None else fitted)
+    return apart_s(runs, [one.sensor.present for one in runs], lags or (UNSEEN,) * len(runs), STANDARD, told)
 
 
 @pytest.mark.parametrize("late_s", [-0.15, -0.1, 0.1, 0.15])
@@ -114,3 +122,133 @@ def test_a_sound_unit_of_which_one_recording_is_late_is_as_good_as_another(proto
     (said,) = [fault.says for fault in found.data_faults if fault.kind == "two_clocks"]
     assert "the reading is 0.10 s late, more than in the other recordings" in said
     assert "s earlier to the load's clock before anything else" in found.limits[0]
+
+
+@pytest.mark.parametrize("late_s", [-1.0, -0.3, 0.3, 1.0])
+def test_a_lag_that_a_recording_tells_alone_is_refined_by_what_the_others_foretell(late_s: float) -> None:
+    """What it tells alone is longer by what its unit relaxes."""
+    found = examine([_run(late_s if seed == 2 else 0.0, seed) for seed in range(3)], STANDARD)
+    assert found.clock_offset_s == pytest.approx((0.0, 0.0, late_s), abs=0.003)
+    assert found.one_clock is None
+    (fault,) = found.faults
+    assert (fault.kind, fault.recording) == ("two_clocks", 2)
+    assert "more than in the other recordings" in fault.says
+
+
+def test_of_several_that_tell_lags_each_is_refined_by_those_that_are_in_time() -> None:
+    found = examine([_run(lag_s, seed) for seed, lag_s in enumerate((0.3, 0.0, -0.6, 0.15, 0.0))], STANDARD)
+    assert found.clock_offset_s == pytest.approx((0.3, 0.0, -0.6, 0.15, 0.0), abs=0.01)
+
+
+def test_where_all_tell_lags_the_shortest_is_taken_as_told_and_the_others_lie_beside_it() -> None:
+    found = examine([_run(lag_s, seed) for seed, lag_s in enumerate((1.2, 0.3, -0.7))], STANDARD)
+    first, shortest, last = found.clock_offset_s
+    assert (first - shortest, shortest, last - shortest) == pytest.approx((0.9, 0.3, -1.0), abs=0.1)
+    off = {k: lag for k, lag in _apart(*found.recordings, own_s=dict(enumerate((1.25, 0.3, -0.65)))).items() if k != 1}
+    assert off == {0: pytest.approx(1.2, abs=0.01), 2: pytest.approx(-0.7, abs=0.01)}
+
+
+# -- what is held out -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("late_s", [0.0, 0.5])
+@pytest.mark.parametrize("beside_s", [-0.5, 0.0, 0.1, 0.15, 0.5, 2.0])
+def test_what_is_held_out_decides_nothing_of_the_clocks_of_those_that_are_fitted(
+    late_s: float, beside_s: float
+) -> None:
+    fitted = [_run(late_s, seed) for seed in range(3)]
+    alone = examine(fitted, STANDARD)
+    found = examine([*fitted, _run(late_s + beside_s, 7)], STANDARD, 3)
+    assert (found.one_clock, found.clock_offset_s[:3]) == (alone.one_clock, alone.clock_offset_s)
+    is_other = abs(beside_s) > 0.1 or (
+        beside_s != 0.0 and late_s == 0.0
+    )  # less than a quarter of a clock's lag is none
+    assert found.others == (frozenset([3]) if is_other else frozenset())
+    ready = aligned(found.recordings, found)
+    assert [one.name for one, _ in ready.parts] == (["delay"] if late_s else [])
+    assert ready.moved == found.others
+    if found.others:
+        (said,) = [one for one in ready.says if "to the clock of the recordings that are fitted" in one]
+        borne_s = float(ready.parts[0][1][0]) if late_s else 0.0
+        by_s = float(said.split("was moved ")[1].split(" s ")[0]) * (1.0 if "earlier" in said else -1.0)
+        assert borne_s + by_s == pytest.approx(late_s + beside_s + borne_s - late_s, abs=0.005)
+        assert any(fault.kind == "two_clocks" and fault.recording == 3 for fault in found.faults)
+
+
+def test_what_is_held_out_does_not_tell_of_two_fitted_recordings_which_is_late() -> None:
+    fitted = [_run(0.1, 1), _run(0.0, 2)]
+    judging = [_run(lag_s, seed) for seed, lag_s in ((3, 0.1), (4, 0.1))]
+    alone, found = examine(fitted, STANDARD), examine([*fitted, *judging], STANDARD, 2)
+    assert found.clock_offset_s[:2] == alone.clock_offset_s
+    assert _apart(_run(0.0, 1), _run(0.1, 2), fitted=1) == {1: pytest.approx(0.1, abs=0.01)}
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.5])
+def test_one_that_judges_and_drifts_by_itself_is_moved_by_what_it_tells_alone(late_s: float) -> None:
+    runs = [_run(late_s, seed) for seed in range(2)] + [_run(0.3, 5)]
+    at_s = np.array([20.0, 30.0, 40.0])
+    alone = [Alone(late_s, 0.0, Lags(at_s, np.full(3, late_s)))] * 2 + [Alone(0.3, 0.01, Lags(at_s, 0.01 * at_s))]
+    usable = [np.ones(len(one), dtype=bool) for one in runs]
+    found = clocks_of(runs, usable, alone, 2, STANDARD)
+    assert (found.shared, found.others, found.found) == (OneClock(late_s, 0.0), frozenset([2]), {})
+    assert found.offsets_s == (late_s, late_s, 0.3)
+    rates = tuple(one.rate for one in alone)
+    integrity = Integrity(tuple(runs), (), tuple(usable), found.offsets_s, rates, found.shared, (), found.others)
+    ready = aligned(runs, integrity)
+    assert ready.moved == {2}
+    assert f"{0.3 - late_s:.3g}".lstrip("-") in ready.says[0]
+
+
+# -- long ones --------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("lasts_s", [2.0, 8.0, 30.0])
+def test_beside_a_day_a_few_seconds_tell_nothing_of_moments(lasts_s: float) -> None:
+    time_s = np.arange(0.0, 86400.0)
+    load = 400.0 * (1.0 - np.cos(2.0 * np.pi * time_s / 1800.0))
+    day = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=0.1 * load, name="day")
+    short = _run(0.1, 1).taken(slice(0, round(lasts_s / STEP_S)))
+    assert _apart(day, short) == {}
+    assert _apart(short, day) == {}
+    # One that judges is asked by its beginning.
+    assert set(_apart(_run(0.0, 2), day, fitted=1)) <= {1}
+
+
+def test_a_day_without_samples_in_a_recording_is_no_matter() -> None:
+    run = _run(0.0, 1)
+    gap = Recording.from_arrays(
+        time_s=np.where(np.arange(len(run)) < len(run) // 2, run.time_s, run.time_s + 2e5),
+        force_n=run.force_n,
+        pressure_mbar=run.sensor.values,
+        name="gap",
+    )
+    assert _apart(gap, _run(0.0, 2), _run(0.0, 3)) == {}
+
+
+# -- large numbers ----------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("size", [1e-300, 1e150, 1e300])
+@pytest.mark.parametrize("of_load", [False, True])
+@pytest.mark.filterwarnings("error")
+def test_numbers_of_any_size_tell_the_same(size: float, of_load: bool) -> None:
+    """Squares of them may be no numbers."""
+    plain = [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
+    large = []
+    for one in plain:
+        channel = one.load if of_load else one.sensor
+        large.append(one.with_channel(channel.with_values(size * channel.values)))
+    for part in (slice(0, None), slice(0, 300)):
+        found, usual = (examine([one.taken(part) for one in runs], STANDARD) for runs in (large, plain))
+        assert found.refusals == ()
+        assert found.clock_offset_s == pytest.approx(usual.clock_offset_s, abs=1e-6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_reading_of_large_numbers_is_as_good_as_another() -> None:
+    runs = [_run(0.0, seed) for seed in (1, 2)]
+    large = [one.with_channel(one.sensor.with_values(1e200 * one.sensor.values)) for one in runs]
+    plain, found = diagnose(runs), diagnose(large)
+    assert found.verdict == plain.verdict
+    assert [one.name for one in found.causes] == [one.name for one in plain.causes]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_numbers_whose_sums_are_none_are_refused() -> None:
+    run = _run(0.0, 1)
+    (said,) = examine([run.with_channel(run.sensor.with_values(1e306 * run.sensor.values))], STANDARD).refusals
+    assert "which are no measurements: give another unit" in said

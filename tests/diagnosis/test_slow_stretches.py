@@ -1,0 +1,93 @@
+"""A stretch that was logged at a lower rate than the rest is used as far as fits can follow it, or said not to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._prepared import prepared
+from smartshoe.diagnosis._slow_stretches import between_samples, too_slow_of
+from smartshoe.integrity import examine
+from smartshoe.recording import Recording
+
+STANDARD = Thresholds()
+Array = NDArray[np.float64]
+
+
+def _stamps(*stretches: tuple[int, float]) -> Array:
+    """(n,) times of stretches of so many samples, so far apart."""
+    return np.concatenate([[0.0], np.cumsum(np.concatenate([np.full(count, step) for count, step in stretches]))])
+
+
+def test_moments_between_samples_as_far_apart_as_those_about_them_are_known() -> None:
+    time_s = _stamps((200, 0.01), (200, 0.03), (200, 0.05))
+    at_s = np.arange(0.0, time_s[-1], 0.01)
+    near, far = between_samples(time_s, at_s, np.ones(time_s.size, dtype=bool), 0.035, STANDARD)
+    assert np.array_equal(near, at_s <= 8.0 + 1e-9)
+    assert np.array_equal(far, ~near)
+
+
+@pytest.mark.parametrize("step_s", [0.01, 0.03])
+def test_what_is_missing_in_an_even_stretch_is_a_gap_and_not_slow(step_s: float) -> None:
+    time_s = np.delete(_stamps((500, step_s), (20, 0.01)), [100, 101, 300])
+    at_s = np.arange(0.0, time_s[-1], 0.01)
+    near, far = between_samples(time_s, at_s, np.ones(time_s.size, dtype=bool), 1.0, STANDARD)
+    lacking = ((at_s > 99.0 * step_s) & (at_s < 102.0 * step_s)) | ((at_s > 299.0 * step_s) & (at_s < 301.0 * step_s))
+    assert np.mean(near != ~lacking) < 0.005  # stamps are rounded
+    assert not far.any()
+
+
+def test_nor_is_known_what_lies_beside_a_sample_that_is_at_fault() -> None:
+    time_s = _stamps((300, 0.03))
+    good = np.arange(time_s.size) != 100
+    at_s = np.array([2.985, 3.015, 2.96, 3.04])
+    near, far = between_samples(time_s, at_s, good, 0.035, STANDARD)
+    assert near.tolist() == [False, False, True, True]
+    assert not far.any()
+
+
+def _run(slower: int, name: str, rate_hz: float = 100.0) -> Recording:
+    """Triangles; of the second half every so manieth sample."""
+    at = np.arange(8000)
+    at = at[(at < 4000) | (at % slower == 0)]
+    time_s = at / rate_hz
+    load = 800.0 * np.abs((time_s / 10.0) % 1.0 - 0.5)
+    noise = np.random.default_rng(len(name)).standard_normal((2, at.size))
+    return Recording.from_arrays(
+        time_s=time_s, force_n=load + 0.2 * noise[0], pressure_mbar=0.25 * load + 0.05 * noise[1], name=name
+    )
+
+
+@pytest.mark.parametrize(("slower", "is_used"), [(1, True), (2, True), (3, True), (50, False)])
+def test_half_a_recording_at_a_lower_rate_is_used_or_said_not_to_be(slower: int, is_used: bool) -> None:
+    runs = [_run(slower, "one"), _run(slower, "other")]
+    integrity = examine(runs, STANDARD)
+    ready = prepared(runs, 2, integrity, STANDARD)
+    for one in (*ready.sessions, *ready.fine):
+        half = one.usable.size // 2
+        assert one.usable[:half].mean() > 0.99
+        used = float(one.usable[half + 50 :].mean())
+        assert used > 0.99 if is_used else used < 0.05  # at full rate the samples themselves are there
+        assert not one.gap_ends or not is_used
+    said = [one for one in ready.limits if "of it is not used" in one]
+    if is_used:
+        assert said == []
+        return
+    assert len(said) == 2
+    assert "one: from 40" in said[0]
+    assert "50 % of it is not used: samples are 0.5 s apart there" in said[0]
+
+
+def test_nothing_is_said_of_what_is_logged_evenly_or_shakes() -> None:
+    run = _run(1, "even")
+    usable = np.ones(len(run), dtype=bool)
+    assert too_slow_of(run, usable, 0.001, STANDARD) is None
+    rng = np.random.default_rng(1)
+    shaken = Recording.from_arrays(
+        time_s=run.time_s + 0.004 * rng.uniform(-1.0, 1.0, len(run)),
+        force_n=run.force_n,
+        pressure_mbar=run.sensor.values,
+    )
+    assert too_slow_of(shaken, usable, 0.035, STANDARD) is None
