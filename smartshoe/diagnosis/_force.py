@@ -216,8 +216,11 @@ def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
 
 
 def _off_n(session: Session, model: ExtendedModel) -> Array:
-    """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
-    compensator = _compensator(model, session)
+    """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading.
+
+    The clock goes on from the recordings that this one continues.
+    """
+    compensator = _compensator(model, session, session.conditions.before.get("time_s", 0.0))
     undone = _without(model, compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
     _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
     return _off_by_n(session, model, compensator, own)
@@ -229,8 +232,8 @@ def _without(model: ExtendedModel, names: Iterable[str]) -> ExtendedModel:
     return model
 
 
-def _compensator(model: ExtendedModel, session: Session) -> ExtendedCompensator:
-    return ExtendedCompensator(model, 1.0 / session.conditions.step_s)
+def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:
+    return ExtendedCompensator(model, 1.0 / session.conditions.step_s, started_s=started_s)
 
 
 def _off_by_n(session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float) -> Array:
