@@ -53,6 +53,7 @@ class Session:
     another, in order; ``zero_changes`` those from which on its reading without load is, by ``zero_sd`` of full scale.
     ``gap_ends``: the first samples after gaps in which the load is not known for so long that the wall may have crept.
     ``unknown_past``: the load, as a share, that a unit may remember from before it where it begins at rest.
+    ``white_sd``: standard deviation of the reading's white noise at the full rate, as ``quiet.raw`` is of the load's.
     """
 
     recording: Recording
@@ -71,6 +72,7 @@ class Session:
     zero_sd: float = 0.0
     gap_ends: tuple[int, ...] = ()
     unknown_past: float = 1.0
+    white_sd: float = 0.0
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:
@@ -245,6 +247,7 @@ def _session(
             if begin > 0 and end < logged.load_known.size and (end - begin) * step_s > thresholds.settled_s
         ),
         unknown_past=thresholds.unknown_past,
+        white_sd=like.white_sd if like is not None else noise_sd(reading, thresholds),
     )
 
 
