@@ -131,8 +131,8 @@ def prepare(
 def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresholds: Thresholds) -> list[Session]:
     """``sessions`` of which one load cycle in so many judges, counted on from each to the next in ``order``.
 
-    That is the order in which the unit bore them, as far as it is known, and of their names: which was given first
-    decides nothing.
+    That is the order in which the unit bore them, as far as it is known, and of what they hold: neither a name nor
+    which was given first decides anything.
     """
     count, kept = 0, [*sessions]
     for index in order:
@@ -154,9 +154,12 @@ def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
 
 
 def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
-    """Places of the recordings by their names, but each after the one that it continues, in whatever order they are."""
+    """Places of the recordings by what they hold, but each after the one that it continues, in whatever order they are.
+
+    Names only tell which continues which: files that are renamed are the same data.
+    """
     order: list[int] = []
-    waiting = sorted(range(len(recordings)), key=lambda k: recordings[k].name)
+    waiting = sorted(range(len(recordings)), key=lambda k: _content(recordings[k]))
     while waiting:
         names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
         ready = [k for k in waiting if names[_before(recordings[k])] <= continues(recordings[k], recordings[k])]
@@ -164,6 +167,12 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
         order += [k for k in waiting if k in placed]
         waiting = [k for k in waiting if k not in placed]
     return order
+
+
+def _content(recording: Recording) -> tuple[float, ...]:
+    """How much was recorded, and of what: numbers that keep their order in other units, and of fewer digits."""
+    means = (float(np.mean(one.si)) for one in (recording.load, recording.sensor))
+    return recording.time_s.size, recording.duration_s, *means
 
 
 def pastless(recordings: Sequence[Recording]) -> list[Recording]:
