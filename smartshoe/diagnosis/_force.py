@@ -218,11 +218,17 @@ def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
 def _off_n(session: Session, model: ExtendedModel) -> Array:
     """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading.
 
-    The clock goes on from the recordings that this one continues.
+    Its past is also what the recordings that it continues did to the unit; their clock goes on, for which a compensator
+    can be told when it starts.
     """
-    compensator = _compensator(model, session, session.conditions.before.get("time_s", 0.0))
+    started_s = session.conditions.before.get("time_s", 0.0)
+    compensator = _compensator(model, session, started_s)
     undone = _without(model, compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
-    _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
+    read = undone.simulate(session.conditions)
+    _, own = own_of(session, undone, session.reading - read)
+    if session.conditions.before:
+        rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
+        own = own + read - undone.simulate(rested)
     return _off_by_n(session, model, compensator, own)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -112,12 +112,12 @@ def prepare(
     """
     factors = [*factors, *[min(factors)] * (len(recordings) - len(factors))]
     made: dict[int, Session] = {}
-    left_behind: dict[str | None, dict[str, float]] = {}
+    left_behind: dict[str | None, _Past] = {}
     order = _by_continuation(recordings)
     for index in order:
         recording = recordings[index]
-        before = left_behind.get(_before(recording), {})
-        made[index] = _session(recording, index, usable[index], scale, factors[index], before, thresholds)
+        past = left_behind.get(_before(recording), _Past())
+        made[index] = _session(recording, index, usable[index], scale, factors[index], past, thresholds)
         left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
     sessions = _on_one_scale([made[index] for index in range(len(recordings))])
     if held_out is not None:
@@ -197,10 +197,32 @@ def at_full_rate(
     """The same sessions without thinning: cycles and what is held out as they are."""
     return _on_one_scale(
         [
-            _session(one.recording, one.index, mask, scale, 1, one.conditions.before, thresholds, one)
+            _session(one.recording, one.index, mask, scale, 1, _Past.of(one.conditions), thresholds, one)
             for one, mask in zip(sessions, usable, strict=True)
         ]
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Past:
+    """What recordings that one continues left behind: ``sums`` of theirs, and their ``load`` (n,) each ``step_s``."""
+
+    sums: Mapping[str, float] = field(default_factory=dict)
+    load: Array = field(default_factory=lambda: np.zeros(0))
+    step_s: float = 1.0
+
+    @classmethod
+    def of(cls, conditions: Conditions) -> _Past:
+        """What is known under the conditions of one that continues them."""
+        return cls(conditions.before, conditions.earlier, conditions.step_s)
+
+    def load_every(self, step_s: float) -> Array:
+        """The load on another step, the last sample a step before what continues it."""
+        if self.step_s == step_s or not self.load.size:
+            return self.load
+        count = max(round(self.load.size * self.step_s / step_s), 1)
+        ago_s = step_s * np.arange(count, 0, -1)
+        return np.asarray(np.interp(-ago_s, self.step_s * np.arange(-self.load.size, 0), self.load))
 
 
 def _session(
@@ -209,7 +231,7 @@ def _session(
     usable: Mask,
     scale: Scale,
     factor: int,
-    before: Mapping[str, float],
+    past: _Past,
     thresholds: Thresholds,
     like: Session | None = None,
 ) -> Session:
@@ -228,7 +250,8 @@ def _session(
         quiet.left * float(np.sqrt(np.sum(weights**2))),
         temperature_k=beside.get("temperature_k"),
         neighbour=beside.get("neighbour"),
-        before=before,
+        before=past.sums,
+        earlier=past.load_every(step_s * factor),
     )
     there = smoothed(logged.usable.astype(float), weights, factor)
     # A reading that is logged at a part of the load's rate never fills a window.
@@ -408,13 +431,14 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     return np.cumsum(cycle)
 
 
-def _left_behind(conditions: Conditions, thresholds: Thresholds) -> dict[str, float]:
+def _left_behind(conditions: Conditions, thresholds: Thresholds) -> _Past:
     load = conditions.load
     before = conditions.before
-    return {
+    sums = {
         "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
         "cycles": before.get("cycles", 0.0) + len(rises_of(load, thresholds.cycle)),
         "way": before.get("way", 0.0) + float(half_way(conditions)[-1]),
         "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
         "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),
     }
+    return _Past(sums, np.concatenate([conditions.earlier, load]), conditions.step_s)
