@@ -216,10 +216,19 @@ def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
 
 
 def _off_n(session: Session, model: ExtendedModel) -> Array:
-    """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
-    compensator = _compensator(model, session)
+    """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading.
+
+    Its past is also what the recordings that it continues did to the unit; their clock goes on, for which a compensator
+    can be told when it starts.
+    """
+    started_s = session.conditions.before.get("time_s", 0.0)
+    compensator = _compensator(model, session, started_s)
     undone = _without(model, compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
-    _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
+    read = undone.simulate(session.conditions)
+    _, own = own_of(session, undone, session.reading - read)
+    if session.conditions.before:
+        rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
+        own = own + read - undone.simulate(rested)
     return _off_by_n(session, model, compensator, own)
 
 
@@ -229,8 +238,8 @@ def _without(model: ExtendedModel, names: Iterable[str]) -> ExtendedModel:
     return model
 
 
-def _compensator(model: ExtendedModel, session: Session) -> ExtendedCompensator:
-    return ExtendedCompensator(model, 1.0 / session.conditions.step_s)
+def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:
+    return ExtendedCompensator(model, 1.0 / session.conditions.step_s, started_s=started_s)
 
 
 def _off_by_n(session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float) -> Array:

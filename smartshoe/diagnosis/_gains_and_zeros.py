@@ -224,7 +224,7 @@ def _is_abrupt(session: Session, at: int, model: ExtendedModel, thresholds: Thre
     ((_, _, steps),) = _own_of_each([session], model)
     share = session.zero_sd * float(steps[session.zero_changes.index(at)])
     left, near = residual_of(session, model), session.reading.size // (MOMENTS + 1)
-    before, after = (left[part][session.fitted[part]] for part in (slice(at - near, at), slice(at, at + near)))
+    before, after = (left[part][session.fitted[part]] for part in (slice(max(at - near, 0), at), slice(at, at + near)))
     seen = share + (float(after.mean() - before.mean()) if before.size and after.size else 0.0)
     return thresholds.clear * seen * math.copysign(1.0, share) >= abs(share)
 

@@ -229,6 +229,23 @@ def led_back_of(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
     )
 
 
+def in_a_tare_of(
+    zeros: Sequence[Zero], effects: Sequence[Effect], scale: Scale, thresholds: Thresholds
+) -> tuple[str, ...]:
+    """What is said of ``effects`` that are curves, where the full scale that they are told over holds a tare.
+
+    The same curve over another range has other parameters: a parabola's distance from its chord goes by the square.
+    """
+    curves = [effect.name for effect in effects if effect.is_memoryless]
+    return tuple(
+        f"full scale is {scale.load_n:.4g} N of the load as logged, {(1.0 + tare.value) * scale.load_n:.4g} N without"
+        f" the tare: the parameters of the {listed(curves)} are of a curve over all of the former (take the tare off"
+        " the loads for those of the latter)"
+        for tare in zeros
+        if curves and tare.effect.shifts == "load" and abs(tare.value) > thresholds.standing
+    )
+
+
 def crept_of(drift: Name, tare: Zero | None) -> str | None:
     """What is said of a drift of the zero that a tare may make by creeping, where there is one."""
     if tare is None:

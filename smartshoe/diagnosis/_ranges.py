@@ -39,14 +39,14 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in kept)
     if is_narrow and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
-        load, reading = kept[0]
-        through_zero = float(reading.mean() / load.mean())
-        low, high = np.quantile(load, [0.01, 0.99]) * scale.load_n
+        through_zero = float(np.median([reading.mean() / load.mean() for load, reading in kept]))
+        lowest = min(range(len(kept)), key=lambda k: float(kept[k][0].min()))
+        low, high = np.quantile(kept[lowest][0], [0.01, 0.99]) * scale.load_n
         is_gauge = scale.unit.quantity == "pressure"  # the zero of others is a convention, through which no line goes
         trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
-            f" {fitted[0].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
+            f" {fitted[lowest].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
             f" ({1.0 / (gain * to_physical):.4g} N/{unit})"
             + (
                 f", where reading over load is {through_zero * to_physical:.3g} {unit}/N"

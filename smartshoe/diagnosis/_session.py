@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -54,6 +54,7 @@ class Session:
     another, in order; ``zero_changes`` those from which on its reading without load is, by ``zero_sd`` of full scale.
     ``gap_ends``: the first samples after gaps in which the load is not known for so long that the wall may have crept.
     ``unknown_past``: the load, as a share, that a unit may remember from before it where it begins at rest.
+    ``white_sd``: standard deviation of the reading's white noise at the full rate, as ``quiet.raw`` is of the load's.
     """
 
     recording: Recording
@@ -72,6 +73,7 @@ class Session:
     zero_sd: float = 0.0
     gap_ends: tuple[int, ...] = ()
     unknown_past: float = 1.0
+    white_sd: float = 0.0
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:
@@ -111,12 +113,12 @@ def prepare(
     """
     factors = [*factors, *[min(factors)] * (len(recordings) - len(factors))]
     made: dict[int, Session] = {}
-    left_behind: dict[str | None, dict[str, float]] = {}
+    left_behind: dict[str | None, _Past] = {}
     order = _by_continuation(recordings)
     for index in order:
         recording = recordings[index]
-        before = left_behind.get(_before(recording), {})
-        made[index] = _session(recording, index, usable[index], scale, factors[index], before, thresholds)
+        past = left_behind.get(_before(recording), _Past())
+        made[index] = _session(recording, index, usable[index], scale, factors[index], past, thresholds)
         left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
     sessions = _on_one_scale([made[index] for index in range(len(recordings))])
     if held_out is not None:
@@ -130,8 +132,8 @@ def prepare(
 def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresholds: Thresholds) -> list[Session]:
     """``sessions`` of which one load cycle in so many judges, counted on from each to the next in ``order``.
 
-    That is the order in which the unit bore them, as far as it is known, and of their names: which was given first
-    decides nothing.
+    That is the order in which the unit bore them, as far as it is known, and of what they hold: neither a name nor
+    which was given first decides anything.
     """
     count, kept = 0, [*sessions]
     for index in order:
@@ -153,9 +155,12 @@ def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
 
 
 def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
-    """Places of the recordings by their names, but each after the one that it continues, in whatever order they are."""
+    """Places of the recordings by what they hold, but each after the one that it continues, in whatever order they are.
+
+    Names only tell which continues which: files that are renamed are the same data.
+    """
     order: list[int] = []
-    waiting = sorted(range(len(recordings)), key=lambda k: recordings[k].name)
+    waiting = sorted(range(len(recordings)), key=lambda k: _content(recordings[k]))
     while waiting:
         names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
         ready = [k for k in waiting if names[_before(recordings[k])] <= continues(recordings[k], recordings[k])]
@@ -163,6 +168,12 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
         order += [k for k in waiting if k in placed]
         waiting = [k for k in waiting if k not in placed]
     return order
+
+
+def _content(recording: Recording) -> tuple[float, ...]:
+    """How much was recorded, and of what: numbers that keep their order in other units, and of fewer digits."""
+    means = (float(np.mean(one.si)) for one in (recording.load, recording.sensor))
+    return recording.time_s.size, recording.duration_s, *means
 
 
 def pastless(recordings: Sequence[Recording]) -> list[Recording]:
@@ -187,10 +198,32 @@ def at_full_rate(
     """The same sessions without thinning: cycles and what is held out as they are."""
     return _on_one_scale(
         [
-            _session(one.recording, one.index, mask, scale, 1, one.conditions.before, thresholds, one)
+            _session(one.recording, one.index, mask, scale, 1, _Past.of(one.conditions), thresholds, one)
             for one, mask in zip(sessions, usable, strict=True)
         ]
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Past:
+    """What recordings that one continues left behind: ``sums`` of theirs, and their ``load`` (n,) each ``step_s``."""
+
+    sums: Mapping[str, float] = field(default_factory=dict)
+    load: Array = field(default_factory=lambda: np.zeros(0))
+    step_s: float = 1.0
+
+    @classmethod
+    def of(cls, conditions: Conditions) -> _Past:
+        """What is known under the conditions of one that continues them."""
+        return cls(conditions.before, conditions.earlier, conditions.step_s)
+
+    def load_every(self, step_s: float) -> Array:
+        """The load on another step, the last sample a step before what continues it."""
+        if self.step_s == step_s or not self.load.size:
+            return self.load
+        count = max(round(self.load.size * self.step_s / step_s), 1)
+        ago_s = step_s * np.arange(count, 0, -1)
+        return np.asarray(np.interp(-ago_s, self.step_s * np.arange(-self.load.size, 0), self.load))
 
 
 def _session(
@@ -199,7 +232,7 @@ def _session(
     usable: Mask,
     scale: Scale,
     factor: int,
-    before: Mapping[str, float],
+    past: _Past,
     thresholds: Thresholds,
     like: Session | None = None,
 ) -> Session:
@@ -221,7 +254,8 @@ def _session(
         quiet.left * float(np.sqrt(np.sum(weights**2))),
         temperature_k=beside.get("temperature_k"),
         neighbour=beside.get("neighbour"),
-        before=before,
+        before=past.sums,
+        earlier=past.load_every(step_s * factor),
     )
     there = smoothed(logged.usable.astype(float), weights, factor)
     # A reading that is logged at a part of the load's rate never fills a window.
@@ -249,6 +283,7 @@ def _session(
             if begin > 0 and end < logged.load_known.size and (end - begin) * step_s > thresholds.settled_s
         ),
         unknown_past=thresholds.unknown_past,
+        white_sd=like.white_sd if like is not None else noise_sd(reading, thresholds),
     )
 
 
@@ -407,13 +442,14 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     return np.cumsum(cycle)
 
 
-def _left_behind(conditions: Conditions, thresholds: Thresholds) -> dict[str, float]:
+def _left_behind(conditions: Conditions, thresholds: Thresholds) -> _Past:
     load = conditions.load
     before = conditions.before
-    return {
+    sums = {
         "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
         "cycles": before.get("cycles", 0.0) + len(rises_of(load, thresholds.cycle)),
         "way": before.get("way", 0.0) + float(half_way(conditions)[-1]),
         "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
         "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),
     }
+    return _Past(sums, np.concatenate([conditions.earlier, load]), conditions.step_s)

@@ -10,6 +10,7 @@ from smartshoe.diagnosis._limits import (
     crept_of,
     departure_of,
     few_cycles_of,
+    in_a_tare_of,
     led_back_of,
     moved_of,
     not_shown_of,
@@ -66,7 +67,9 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
         if not (one.is_past or one.led_from or (found.zero_changes and one.effect.shifts == "reading"))
     )
     seen = Chosen(names, kept, (*before, *seen.limits), seen.nameless, (*past, *led))
-    return seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
+    seen = seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
+    of_tare = in_a_tare_of(kept, [one.effect for one in seen.names], given.scale, thresholds)
+    return replace(seen, of_zeros=(*seen.of_zeros, *of_tare))
 
 
 def _shown(found: Inference, given: Prepared, left: float) -> Chosen:

@@ -7,10 +7,12 @@ never unloaded, either may make the same offset.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._baseline import is_stretched
@@ -21,6 +23,7 @@ from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, shift_of
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.signals.noise import NORMAL_95
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +86,13 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
 
 
 def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:
-    """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
+    """(m, 5) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
     by then, and what the unit is seen to remember from before the recording, as where a walk was cut: these are taken
-    out, and the third column is how much they are. A load that begins to rise at once is no rest, nor is one whose
-    reading, on a clock that is early, has begun to rise before it.
+    out, and the third column is how much they are. The last two are the standard deviations that white noise leaves to
+    the means of load and reading. A load that begins to rise at once is no rest, nor is one whose reading, on a clock
+    that is early, has begun to rise before it.
     """
     found = []
     for session in sessions:
@@ -119,8 +123,10 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
             moved_by += _remembered(session, model, session.reading - whole, rest, first, thresholds)
             drifted = float(np.mean(moved_by[first][kept]))
             reading = float(np.mean(session.reading[first][kept])) - drifted
-            found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
-    return np.array(found).reshape(-1, 3)
+            noise = np.array([session.quiet.raw, session.white_sd / model.gain])
+            noise /= np.sqrt(kept.sum() * session.thinned)  # as many were taken of it, whatever is left of them
+            found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain, *noise))
+    return np.array(found).reshape(-1, 5)
 
 
 def _remembered(
@@ -192,9 +198,10 @@ def zeros_of(
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size:
         return _unseen(sessions, model, left, remembered, thresholds, rubbed)
-    loads, readings, drifted = rests.T
-    sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
-    load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
+    loads, readings, drifted, *white = rests.T
+    load_sd, reading_sd = (
+        sd_of_a_mean(one, sds, thresholds) for one, sds in zip((loads, readings), white, strict=True)
+    )
     slow = noise.of_a_mean(thresholds.hold_s) / np.sqrt(len(rests)) if noise is not None and noise.is_noise else 0.0
     as_read_sd = float(np.hypot(reading_sd, slow))
     reading_sd = float(np.hypot(as_read_sd, thresholds.departure * np.mean(np.abs(drifted))))
@@ -218,6 +225,23 @@ def zeros_of(
         value = reading * model.gain
         named.append(Zero(sensor, value, reading_sd, abs(value), (), _is_past(value, sessions, model, thresholds)))
     return tuple(sorted(named, key=lambda one: -one.size))
+
+
+def sd_of_a_mean(zeros: Array, white_sds: Array, thresholds: Thresholds) -> float:
+    """Standard deviation of the mean of ``zeros`` (m,), each with white noise of ``white_sds`` (m,).
+
+    Of the noise, of how well a rest is known to be zero, and of what the recordings scatter by beyond their noise. That
+    is estimated from few: so all of it is widened as Student's t is beside the normal law, where each holds 95 %, with
+    as many degrees of freedom as the part that is estimated leaves (Satterthwaite 1946).
+    """
+    known = thresholds.zero_sd**2 + float(np.mean(white_sds**2)) / zeros.size
+    if zeros.size < 2:
+        return math.sqrt(known)
+    scatter = max(float(np.var(zeros, ddof=1) - np.mean(white_sds**2)), 0.0) / zeros.size
+    if scatter == 0.0:
+        return math.sqrt(known)
+    freedom = (zeros.size - 1) * ((known + scatter) / scatter) ** 2
+    return math.sqrt(known + scatter) * float(stdtrit(freedom, 0.975)) / NORMAL_95
 
 
 def creeping(zeros: Sequence[Zero], drift: Effect, size: float, thresholds: Thresholds) -> Zero | None:

@@ -160,7 +160,7 @@ class ExtendedModel:
             if inputs is not None:
                 inputs.append(signal)
             if part is None:
-                signal = (core or self.core).simulate(signal, conditions.step_s)
+                signal = _through(core or self.core, signal, conditions)
             else:
                 given = self._around(conditions) if part.effect.bends_beside_arm else conditions
                 signal = part.effect.apply(signal, given, part.values)
@@ -274,6 +274,17 @@ class ExtendedModel:
             **plain,
             parts=tuple(Part(one, np.array([_stored(p, values) for p in one.parameters])) for one, values in parts),
         )
+
+
+def _through(core: Core, signal: Array, conditions: Conditions) -> Array:
+    """What comes out of a core (n,) for a ``signal`` (n,) after the load that went before the recording.
+
+    That load as it was measured: what blocks before the core would make of it is small in a memory.
+    """
+    earlier = conditions.earlier
+    if not earlier.size:
+        return core.simulate(signal, conditions.step_s)
+    return core.simulate(np.concatenate([earlier, signal]), conditions.step_s)[earlier.size :]
 
 
 def _stored(parameter: EffectParameter, values: Mapping[str, float]) -> float:

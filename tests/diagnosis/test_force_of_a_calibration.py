@@ -177,6 +177,34 @@ def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Sessi
         assert as_calibrated(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "values"), [("zero_drift", [0.001, 0.0, 60.0, 1.0]), ("gain_drift", [0.0005, 0.0, 60.0, 0.0, 1.0])]
+)
+def test_the_force_of_what_continues_a_recording_is_by_a_clock_that_goes_on(
+    one: Session, name: str, values: list[float]
+) -> None:
+    """A gain that drifted for ten minutes, or a zero, is where it has come to."""
+    later = replace(one.conditions, before={"time_s": 600.0}, cache={})
+    drifting = MODEL.with_part(name, np.array(values))
+    on = replace(one, conditions=later, reading=drifting.simulate(later))
+    assert force_error([on], drifting).fitted_n < 1e-3 * 800.0
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("second_relaxation", [0.2, 12.0]), ("cycle_conditioning", [0.1, 3.0, 0.0, 1.0]), ("permanent_set", [1e-4, 1.0])],
+)
+def test_what_earlier_recordings_did_to_a_unit_is_no_part_of_the_force(
+    one: Session, name: str, values: list[float]
+) -> None:
+    earlier = 0.5 + 0.5 * np.sin(0.05 * np.arange(600))
+    before = {"time_s": 600.0, "cycles": 2.0, "dose": 300.0, "largest_load": 1.0}
+    later = replace(one.conditions, before=before, earlier=earlier, cache={})
+    model = MODEL.with_part(name, np.array(values))
+    on = replace(one, conditions=later, reading=model.simulate(later))
+    assert force_error([on], model).fitted_n < 1e-3 * 800.0
+
+
 def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
     nothing = ForceError(0.0, 0.0)

@@ -16,6 +16,7 @@ from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds, _gains_and_zeros
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gains_and_zeros import (
+    MOMENTS,
     OwnGain,
     ZeroChange,
     _Gained,
@@ -62,9 +63,9 @@ def _run(number: int, gain: float, **metadata: str) -> Recording:
     )
 
 
-def _sessions(*runs: Recording) -> list[Session]:
+def _sessions(*runs: Recording, factor: int = 4) -> list[Session]:
     usable = [one.sensor.present for one in runs]
-    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), [4], STANDARD)
+    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), [factor], STANDARD)
 
 
 @pytest.fixture(scope="module")
@@ -271,6 +272,18 @@ def test_what_creeps_is_no_zero_that_jumps(of_step: float, is_jump: bool) -> Non
     more = (1.0 - abs(of_step)) * np.clip((time_s - 5.0) / 25.0, 0.0, 1.0) + of_step * (time_s >= 17.0)
     (session,) = _sessions(run.with_channel(replace(reading, values=reading.values + SPAN_MBAR * 0.02 * more)))
     at = int(np.searchsorted(session.conditions.time_s, 17.0))
+    changed = replace(session, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
+    assert _is_abrupt(changed, at, CURVED, STANDARD) is is_jump
+
+
+@pytest.mark.parametrize(("of_step", "is_jump"), [(0.0, False), (1.0, True)])
+def test_what_creeps_at_the_very_beginning_is_no_zero_that_jumps(of_step: float, is_jump: bool) -> None:
+    """Less lies before it than between two moments: all that there is tells what was before."""
+    run = _run(1, 0.0)
+    reading, time_s, at = run.sensors[0], run.time_s, TIME_S.size // (MOMENTS + 1) // 2
+    more = (1.0 - of_step) * np.clip(time_s / 25.0, 0.0, 1.0) + of_step * (time_s >= TIME_S[at])
+    moved = run.with_channel(replace(reading, values=reading.values + SPAN_MBAR * 0.02 * more))
+    (session,) = _sessions(moved, factor=1)
     changed = replace(session, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
     assert _is_abrupt(changed, at, CURVED, STANDARD) is is_jump
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -373,11 +375,37 @@ def test_the_same_load_cycles_judge_in_whatever_order_recordings_are_given(metad
     assert judging(first, second) == judging(second, first) == {"a": [2, 5], "b": [1, 4, 7]}
 
 
-def test_of_recordings_that_continue_each_other_the_first_by_name_comes_first() -> None:
-    first, second = (pressed(triangles(6)) for _ in range(2))
-    ring = [replace(first, name=one, metadata={"continues": other}) for one, other in (("a", "b"), ("b", "a"))]
+@pytest.mark.parametrize(("heights", "cycles"), [((1.0, 0.9, 0.8), (7, 7, 7)), ((1.0, 1.0, 1.0), (8, 7, 8))])
+def test_the_same_load_cycles_judge_whatever_recordings_are_called(
+    heights: tuple[float, ...], cycles: tuple[int, ...]
+) -> None:
+    noise = np.random.default_rng(5)
+    loads = [triangles(count, height=height) for count, height in zip(cycles, heights, strict=True)]
+    runs = [pressed(load, load + 1e-3 * noise.standard_normal(load.size)) for load in loads]
+
+    def judging(names: str, order: Sequence[int]) -> list[list[int]]:
+        given = [replace(runs[k], name=names[k]) for k in order]
+        usable = [one.sensor.present for one in given]
+        sessions = prepare(given, usable, None, full_scale(given, usable, STANDARD), [1], STANDARD)
+        told = {k: sorted({*one.cycle[one.held_out].tolist()}) for k, one in zip(order, sessions, strict=True)}
+        return [told[k] for k in range(3)]
+
+    orders = [*permutations(range(3))]
+    expected = judging("abc", orders[0])
+    for order in orders:
+        for name in ("abc", "bca", "cab", "acb", "aaa"):
+            assert judging(name, order) == expected
+
+
+def test_of_recordings_that_continue_each_other_the_shortest_comes_first() -> None:
+    first, second = pressed(triangles(7)), pressed(triangles(6))
+    names = (("a", "b"), ("b", "a"))
+    ring = [
+        replace(run, name=one, metadata={"continues": other})
+        for run, (one, other) in zip((first, second), names, strict=True)
+    ]
     sessions, _ = prepared(*ring)
-    assert [bool(one.conditions.before) for one in sessions] == [False, True]
+    assert [bool(one.conditions.before) for one in sessions] == [True, False]
     (alone,), _ = prepared(replace(second, name="a", metadata={"continues": "a"}))
     assert alone.conditions.before == {}
 

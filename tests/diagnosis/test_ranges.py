@@ -221,3 +221,15 @@ def test_a_reading_that_stands_still_over_a_quarter_of_the_loads_or_more_is_told
 def test_a_reading_that_bends_does_not_stand_still() -> None:
     load, _ = _proportional(0.0, 800.0)
     assert _ranges((load, 7.0 * np.sqrt(load))) == Ranges()
+
+
+def test_whether_a_gain_is_a_trap_does_not_go_by_the_order_of_files() -> None:
+    """What most of them say decides: the zero of one is off."""
+    load = 600.0 + 200.0 * TRIANGLE
+    proper, off = _proportional(600.0, 800.0), (load + 50.0, GAIN_MBAR_PER_N * load + 300.0)
+    for given in ((proper, proper, off), (off, proper, proper), (proper, off, proper)):
+        assert not _ranges(*given).is_trap
+    trap = load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)
+    for given in ((proper, trap, trap), (trap, proper, trap)):
+        found = _ranges(*given)
+        assert found.is_trap

@@ -298,18 +298,33 @@ def test_fewer_than_six_cycles_make_twelve_parts_of_the_time(rises: int, count: 
 def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
     load = course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
     dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in itertools.pairwise(load))
-    first = _left_behind(_conditions(load), STANDARD)
+    first = dict(_left_behind(_conditions(load), STANDARD).sums)
     way = 0.5 * float(np.sum(np.abs(np.diff(load))))
     # A reversal shows in full but for twice the play's half width, which is no noise.
     assert first.pop("way") == pytest.approx(way, abs=4 * LEAST_DEAD_ZONE)
     assert first == pytest.approx({"largest_load": 0.9, "cycles": 2.0, "time_s": 90 * STEP_S, "dose": dose})
     before = {"largest_load": 0.95, "cycles": 7.0, "way": 3.0, "time_s": 30.0, "dose": 4.0}
-    later = _left_behind(_conditions(load, before=before), STANDARD)
+    later = dict(_left_behind(_conditions(load, before=before), STANDARD).sums)
     assert later.pop("way") == pytest.approx(3.0 + way, abs=4 * LEAST_DEAD_ZONE)
     expected = {"largest_load": 0.95, "cycles": 9.0, "time_s": 30.0 + 90 * STEP_S, "dose": 4.0 + dose}
     assert later == pytest.approx(expected)
-    lower = _left_behind(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD)
+    lower = _left_behind(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD).sums
     assert lower["largest_load"] == pytest.approx(0.9)
+
+
+def test_a_recording_that_continues_others_knows_their_loads_at_its_own_step() -> None:
+    ramp = 0.01 * np.arange(30)
+    loads = [ramp, ramp + 0.3, ramp + 0.6]
+    names = [("a", {}), ("b", {"continues": "a"}), ("c", {"continues": "b"})]
+    runs = [replace(_run(load), name=name, metadata=more) for load, (name, more) in zip(loads, names, strict=True)]
+    for factors in ([1, 1, 1], [2, 1, 2]):
+        usable = [one.sensor.present for one in runs]
+        sessions = prepare(runs, usable, [False] * 3, Scale(800.0, 140.0, MILLIBAR), factors, STANDARD)
+        assert [one.conditions.earlier.size * one.thinned for one in sessions] == [0, 30, 60]
+        last, step = sessions[2].conditions, factors[2]
+        assert last.earlier[-10:] == pytest.approx(0.6 - 0.01 * step * np.arange(10, 0, -1), abs=0.01 * step)
+        fine = at_full_rate(sessions, usable, Scale(800.0, 140.0, MILLIBAR), STANDARD)[2].conditions
+        assert fine.earlier == pytest.approx(0.01 * np.arange(60), abs=0.01 * step)
 
 
 # -- sessions ---------------------------------------------------------------------------------------------------------

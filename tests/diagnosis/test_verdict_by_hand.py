@@ -21,6 +21,7 @@ from smartshoe.diagnosis._limits import (
     crept_of,
     elsewhere_of,
     end_of_range_of,
+    in_a_tare_of,
     led_back_of,
     not_shown_of,
     other_kind_of,
@@ -240,6 +241,17 @@ def test_a_past_is_said_in_the_readings_unit() -> None:
     zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
     assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, replace(SCALE, reading=140.0))
     assert "the zero stands at 7 mbar where" in past_of(zero, SCALE)  # it falls as the load grows
+
+
+def test_of_a_curve_beside_a_tare_the_range_is_told_that_its_parameters_are_of() -> None:
+    tare, offset = (Zero(shift_of(what), -0.375, 0.001, 0.4) for what in ("load", "reading"))
+    curve, other = effect("sensor_nonlinearity"), effect("play_hysteresis")
+    (said,) = in_a_tare_of([offset, tare], [other, curve], SCALE, STANDARD)
+    assert "full scale is 800 N of the load as logged, 500 N without the tare" in said
+    assert "parameters of the sensor nonlinearity are of a curve over all of the former" in said
+    small = replace(tare, value=0.999 * STANDARD.standing)
+    for zeros, effects in (([offset], [curve]), ([tare], [other]), ([small], [curve]), ([tare], [])):
+        assert in_a_tare_of(zeros, effects, SCALE, STANDARD) == ()
 
 
 def test_a_zero_that_is_seen_later_on_is_led_back_from_no_load() -> None:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import aligned
@@ -63,6 +65,18 @@ def _zeros(*runs: Recording, left: float = 0.0, remembered: float = 0.0, rubbed:
 
 
 # -- zeros ------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("offset", [0.0, 0.05])
+def test_noise_of_a_short_rest_is_no_offset_and_hides_none_that_is_clear_of_it(offset: float) -> None:
+    """2 % of full scale in each of 25 samples."""
+    told = 0
+    for seed in range(6):
+        run = _run(offset=offset, seed=seed)
+        values = run.sensor.values + FULL_MBAR * 0.02 * np.random.default_rng(seed + 10).standard_normal(TIME_S.size)
+        cut = run.with_channel(replace(run.sensor, values=values)).between(4.0, 60.0)
+        told += "zero_offset" in _zeros(cut)
+    assert told == (6 if offset else 0)
+
+
 @pytest.mark.parametrize("offset", [0.03, -0.02])
 def test_a_reading_of_an_unloaded_unit_is_its_zero(offset: float) -> None:
     found = _zeros(_run(offset=offset, seed=1), _run(offset=offset, seed=2))
@@ -92,13 +106,14 @@ def test_both_zeros_are_told_where_they_differ_the_larger_first() -> None:
 
 
 def test_zeros_that_scatter_are_known_as_well_as_their_mean() -> None:
-    """The standard error of a mean of n, beside how well a rest is known to be zero."""
+    """The standard error of a mean of n, by Student's t, beside how well a rest is known to be zero."""
     values = [0.03, 0.05, 0.01, 0.03]
     found = _zeros(*(_run(offset=offset, seed=k) for k, offset in enumerate(values)))
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    wide = float(student.ppf(0.975, 3.0)) / float(norm.ppf(0.975))
     assert found == {}  # three hundredths are not four of its deviations
     apart = _zeros(*(_run(offset=offset + 0.1, seed=k) for k, offset in enumerate(values)))
-    assert apart["zero_offset"].sd == pytest.approx(np.hypot(error, STANDARD.zero_sd), rel=0.1)
+    assert apart["zero_offset"].sd == pytest.approx(wide * np.hypot(error, STANDARD.zero_sd), rel=0.1)
 
 
 def test_no_zero_is_told_of_a_sensor_whose_zero_is_a_convention() -> None:
@@ -132,7 +147,7 @@ def test_a_first_rest_is_what_is_commanded_where_a_tare_lifts_the_load() -> None
     commanded = plain.with_channel(replace(plain.load, name="command", role="command", values=FULL_N * PRESSED))
     sessions, _ = _sessions(commanded)
     rests = first_rests(sessions, MODEL, STANDARD)
-    assert rests.shape == (1, 3)
+    assert rests.shape == (1, 5)
     load, reading = float(sessions[0].conditions.load[0]), float(np.mean(sessions[0].reading[:25]))
     assert rests[0, :2] == pytest.approx([load, reading], abs=2e-3)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
+from scipy.stats import t as student
 
 from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
@@ -18,7 +20,7 @@ from smartshoe.diagnosis._held_out import past_of
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, zeros_of
+from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, sd_of_a_mean, zeros_of
 from smartshoe.integrity import OneClock
 from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.effects.effect import EffectParameter
@@ -44,11 +46,12 @@ def _no_past(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
 # -- zeros that are seen ----------------------------------------------------------------------------------------------
 def _seen(
     monkeypatch: pytest.MonkeyPatch,
-    rests: list[tuple[float, float, float]],
+    rests: Sequence[tuple[float, ...]],
     scale: Scale = SCALE,
 ) -> dict[str, Any]:
-    """By loads, readings and drifts of first rests."""
-    monkeypatch.setattr(_zero, "first_rests", lambda *given: np.array(rests).reshape(-1, 3))
+    """By loads, readings and drifts of first rests, and the noise of both means."""
+    told = np.array([(*one, 0.0, 0.0)[:5] for one in rests]).reshape(-1, 5)
+    monkeypatch.setattr(_zero, "first_rests", lambda *given: told)
     found = zeros_of([], MODEL, scale, 0.0, 0.0, STANDARD)
     sizes = [one.size for one in found]
     assert sizes == sorted(sizes, reverse=True)
@@ -92,14 +95,41 @@ def test_a_zeros_deviation_is_of_its_scatter_its_rest_and_what_drifted(monkeypat
     rests = [(0.10, -0.05, 0.01), (0.11, -0.06, -0.03), (0.12, -0.09, 0.02)]
     found = _seen(monkeypatch, rests)
     loads, readings, drifted = np.array(rests).T
-    error = np.std(loads, ddof=1) / math.sqrt(3.0)
-    assert found["load"].sd == pytest.approx(math.hypot(error, 4e-4))
+    assert found["load"].sd == pytest.approx(sd_of_a_mean(loads, np.zeros(3), STANDARD))
     assert found["load"].value == pytest.approx(-0.11)
-    spread = np.std(readings, ddof=1) / math.sqrt(3.0)
     assert np.mean(np.abs(drifted)) == pytest.approx(0.02)
-    scattered = _seen(monkeypatch, [(0.3 + a, 0.5 * b, c) for a, b, c in rests])["reading"]
-    assert scattered.value == pytest.approx(0.8 * 0.5 * float(np.mean(readings)))
-    assert scattered.sd == pytest.approx(math.sqrt((0.5 * spread) ** 2 + 4e-4**2 + (0.25 * 0.02) ** 2))
+    scattered = _seen(monkeypatch, [(0.3 + a, 0.1 * b, c) for a, b, c in rests])
+    assert "reading" not in scattered  # a quarter of the drift is more than it
+    scattered = _seen(monkeypatch, [(0.3 + a, 0.1 * b - 0.05, c) for a, b, c in rests])
+    assert scattered["reading"].value == pytest.approx(0.8 * (0.1 * float(np.mean(readings)) - 0.05))
+    error = sd_of_a_mean(0.1 * readings, np.zeros(3), STANDARD)
+    assert scattered["reading"].sd == pytest.approx(math.hypot(error, 0.25 * 0.02))
+
+
+def test_what_recordings_scatter_by_is_known_as_well_as_students_t_says() -> None:
+    """Of three that scatter far beyond all that is known, by two degrees of freedom; of noise that is known, by it."""
+    zeros, none = np.array([0.10, 0.11, 0.12]), np.zeros(3)
+    wide = float(student.ppf(0.975, 2.0)) / float(norm.ppf(0.975))
+    assert sd_of_a_mean(zeros, none, STANDARD) == pytest.approx(
+        wide * math.hypot(0.01 / math.sqrt(3.0), 4e-4), rel=0.01
+    )
+    # As much noise as they scatter by: nothing is estimated.
+    noise = math.sqrt(0.01**2 / 3.0 + 4e-4**2)
+    assert sd_of_a_mean(zeros, np.full(3, 0.01), STANDARD) == pytest.approx(noise)
+    assert sd_of_a_mean(zeros, np.full(3, 0.02), STANDARD) > noise  # nor is noise less where they agree
+    assert sd_of_a_mean(zeros[:1], np.array([0.01]), STANDARD) == pytest.approx(math.hypot(0.01, 4e-4))
+    assert sd_of_a_mean(zeros[:1], none[:1], STANDARD) == STANDARD.zero_sd
+    # Half of it is known: four times as many degrees of freedom.
+    half = sd_of_a_mean(np.array([-1.0, 1.0]) * 4e-4, np.zeros(2), STANDARD)
+    assert half == pytest.approx(math.sqrt(2.0) * 4e-4 * float(student.ppf(0.975, 4.0)) / float(norm.ppf(0.975)))
+
+
+def test_a_zero_within_the_noise_of_its_rest_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of one recording nothing else tells how well its rest is known."""
+    bound = MANY * math.hypot(0.003, STANDARD.zero_sd)
+    for by, is_named in ((0.999, False), (1.001, True)):
+        assert ("reading" in _seen(monkeypatch, [(0.1, -by * bound, 0.0, 0.0, 0.003)])) is is_named
+        assert ("load" in _seen(monkeypatch, [(by * bound, -0.1, 0.0, 0.003, 0.0)])) is is_named
 
 
 # -- zeros that are not -----------------------------------------------------------------------------------------------
@@ -109,6 +139,7 @@ def _session(load: Array, fitted: Any = None) -> Any:
         conditions=Conditions(0.1 * np.arange(load.size), load, 0.1), fitted=kept, reading=0.0 * load,
         resting=np.abs(load) < 0.02, recording=SimpleNamespace(command_n=None), thinned=1,
         own_gain_sd=0.0, gain_parts=(), zero_changes=(), gap_ends=(),
+        quiet=SimpleNamespace(raw=0.0), white_sd=0.0,
     )  # fmt: skip
 
 
@@ -229,7 +260,7 @@ def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear_and_fades_t
     (rest,) = first_rests([one], MODEL, STANDARD)
     gone = 0.1 * float(np.mean(fading[:25])) if is_seen else 0.0
     read = float(np.mean(one.reading[:25]))
-    assert rest == pytest.approx(np.array([0.0, read - gone, gone]) / [1.0, 0.8, 0.8])
+    assert rest[:3] == pytest.approx(np.array([0.0, read - gone, gone]) / [1.0, 0.8, 0.8])
 
 
 # -- first rests ------------------------------------------------------------------------------------------------------
@@ -250,36 +281,36 @@ def test_a_load_that_begins_to_rise_at_once_is_no_rest() -> None:
         load = one.conditions.load.copy()
         load[:20] = 0.1 * per_s * np.arange(20)
         one.conditions = Conditions(one.conditions.time_s, load, 0.1)
-        assert first_rests([one], MODEL, STANDARD).size == (3 if is_told else 0)
+        assert first_rests([one], MODEL, STANDARD).size == (5 if is_told else 0)
 
 
 def test_a_single_sample_of_a_slow_log_is_no_rest() -> None:
     """Nobody sees whether the load stood still there."""
     for count, is_told in ((1, False), (2, True)):
-        assert first_rests([_rested(count, step_s=1.8)], MODEL, STANDARD).size == (3 if is_told else 0)
+        assert first_rests([_rested(count, step_s=1.8)], MODEL, STANDARD).size == (5 if is_told else 0)
 
 
 def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
     """Four tenths of a second: four samples; and no more of it is looked at than of a hold that shows creep."""
     for count, is_told in ((3, False), (4, True)):
         found = first_rests([_rested(count)], MODEL, STANDARD)
-        assert found.shape == ((1, 3) if is_told else (0, 3))
+        assert found.shape == ((1, 5) if is_told else (0, 5))
     long = _rested(50)
     long.reading[30:] = 9.0
     (rest,) = first_rests([long], MODEL, STANDARD)
-    assert rest == pytest.approx([0.0, 0.01 / 0.8, 0.0])
+    assert rest[:3] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
     # Where it is not fitted it does not count; where the unit rests all along it is the first three seconds.
     long.fitted[:27] = False
     assert first_rests([long], MODEL, STANDARD).size == 0
     long.fitted[26] = True
-    assert first_rests([long], MODEL, STANDARD).shape == (1, 3)
+    assert first_rests([long], MODEL, STANDARD).shape == (1, 5)
     ever = _rested(80)
     ever.resting[:] = True
-    assert first_rests([ever], MODEL, STANDARD)[0] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
-    assert first_rests([], MODEL, STANDARD).shape == (0, 3)
+    assert first_rests([ever], MODEL, STANDARD)[0, :3] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
+    assert first_rests([], MODEL, STANDARD).shape == (0, 5)
     slow = _rested(2, step_s=10.0)
     slow.reading[1] = 9.0  # ten seconds on: no more than a single sample lies within a hold
-    assert first_rests([slow], MODEL, STANDARD)[0] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
+    assert first_rests([slow], MODEL, STANDARD)[0, :3] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
 
 
 def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
@@ -291,7 +322,7 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
         command = np.concatenate([np.full(10, asked), np.linspace(1.0, -1000.0, 80)])
         one.recording = SimpleNamespace(command_n=command)
         found = first_rests([one], MODEL, STANDARD)
-        assert found.shape == ((1, 3) if is_told else (0, 3))
+        assert found.shape == ((1, 5) if is_told else (0, 5))
         if is_told:
             assert found[0, :2] == pytest.approx([0.3, 0.2 / 0.8])
     moved = _rested(30, level=0.3, reading=0.2)
@@ -304,7 +335,7 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     command = np.full(90, 500.0)
     command[0:12:3] = 0.0
     thin.recording = SimpleNamespace(command_n=command)
-    assert first_rests([thin], MODEL, STANDARD).shape == (1, 3)
+    assert first_rests([thin], MODEL, STANDARD).shape == (1, 5)
     command[0] = 500.0
     assert first_rests([thin], MODEL, STANDARD).size == 0
 
@@ -315,7 +346,17 @@ def test_a_first_rest_at_a_tare_ends_where_the_load_leaves_it() -> None:
     one.conditions.load[20:30] = 0.3 + 0.02
     one.reading[20:30] = 5.0
     (rest,) = first_rests([one], MODEL, STANDARD)
-    assert rest == pytest.approx([0.3, 0.01 / 0.8, 0.0])
+    assert rest[:3] == pytest.approx([0.3, 0.01 / 0.8, 0.0])
+
+
+def test_the_mean_of_a_rest_is_known_as_well_as_its_noise_and_the_samples_that_were_taken_of_it_let_it() -> None:
+    one = _rested(16)
+    one.quiet, one.white_sd, one.thinned = SimpleNamespace(raw=0.01), 0.02, 4
+    (rest,) = first_rests([one], MODEL, STANDARD)
+    assert rest[3:] == pytest.approx([0.01 / 8.0, 0.02 / 0.8 / 8.0])
+    one.fitted[:12] = False
+    (rest,) = first_rests([one], MODEL, STANDARD)
+    assert rest[3:] == pytest.approx([0.01 / 4.0, 0.02 / 0.8 / 4.0])
 
 
 def test_what_has_drifted_at_rest_is_taken_out_of_a_first_rest() -> None:
@@ -327,7 +368,7 @@ def test_what_has_drifted_at_rest_is_taken_out_of_a_first_rest() -> None:
     assert np.ptp(moved) > 0.0
     (rest,) = first_rests([one], drifting, STANDARD)
     mean = float(np.mean(moved[:25]))
-    assert rest[1:] == pytest.approx([(0.01 - mean) / 0.8, mean / 0.8])
+    assert rest[1:3] == pytest.approx([(0.01 - mean) / 0.8, mean / 0.8])
 
 
 # -- clocks -----------------------------------------------------------------------------------------------------------

@@ -107,6 +107,20 @@ def test_the_baseline_is_an_arm_and_a_gain() -> None:
     assert_allclose(baseline().simulate(at), 0.98 * Core([Arm(0.08, 0.22)], 1.6).simulate(at.load, at.step_s))
 
 
+@pytest.mark.parametrize(("name", "values"), [("second_relaxation", [0.1, 12.0]), ("linear_leak", [1e-3])])
+def test_what_continues_a_recording_begins_with_what_the_wall_and_the_gas_had_come_to(
+    name: str, values: list[float]
+) -> None:
+    load = np.interp(np.arange(2000), [0, 400, 500, 900, 1000, 1400, 1999], [0.0, 1.0, 1.0, 0.0, 0.0, 0.7, 0.0])
+    time_s = 0.02 * np.arange(2000)
+    model = ExtendedModel(1.0, 0.1, 0.2, 800.0, 140.0, "mbar").with_part(name, values)
+    whole = model.simulate(Conditions(time_s, load, 0.02))
+    later = Conditions(time_s[:1000], load[1000:], 0.02, earlier=load[:1000])
+    assert_allclose(model.simulate(later), whole[1000:], rtol=0.0, atol=1e-12)
+    rested = model.simulate(Conditions(time_s[:1000], load[1000:], 0.02))
+    assert np.max(np.abs(rested - whole[1000:])) > 1e-3
+
+
 def test_an_unknown_effect_is_refused_with_the_names_there_are() -> None:
     with pytest.raises(UsageError, match="linear_leak"):
         effect("magic")

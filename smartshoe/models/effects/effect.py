@@ -78,9 +78,9 @@ class Conditions:
 
     ``time_s`` (n,) from the session's start, step ``step_s``; ``load`` (n,) the measured load as a share of full
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
-    load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the first value of the first
-    session, and ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not
-    logged.
+    load, cycles, time, dose) where this one continues it, and ``earlier`` (m,) the load up to then on the same step,
+    (0,) where it continues none. ``temperature_k`` (n,) above the first value of the first session, and ``neighbour``
+    (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
     ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, for effects that say that
     they bend beside it; None for all others, and outside a model.
     """
@@ -92,6 +92,7 @@ class Conditions:
     temperature_k: Array | None = None
     neighbour: Array | None = None
     before: Mapping[str, float] = field(default_factory=dict)
+    earlier: Array = field(default_factory=lambda: np.zeros(0))
     relaxing: tuple[float, float] | None = None
     cache: dict[str, Array] = field(default_factory=dict, repr=False)
     """What blocks derive from the load alone (largest so far, cycles done), by name."""
