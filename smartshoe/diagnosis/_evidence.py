@@ -122,8 +122,9 @@ class Evidence:
         self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.imperfection)
         self._sds[: given.own] = 1.0
         for one in given.candidates:
-            if one.effect.is_flexible:  # a form of its family's laws, whose small imperfections are there already
-                self._sds[np.array(one.columns) - 1] = 0.0
+            places = np.array(one.columns) - 1
+            # As much by all columns of an effect; what no law does is no small imperfection of a good unit.
+            self._sds[places] = 0.0 if one.effect.why_unnamed else self.thresholds.imperfection / math.sqrt(places.size)
         inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
         inner.flat[:: inner.shape[0] + 1] += 1.0
         self._factor = _factor(inner)

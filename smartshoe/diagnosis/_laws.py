@@ -100,7 +100,7 @@ def _law_of(
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
             continue
         # A law that stands beside the block may do without it.
-        one = nothing if law.name in bare.names else fit_with(law, nothing.model, likelihood)
+        one = nothing if law.name in bare.names else fit_with(law, nothing.model, likelihood, beside=bare)
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
         most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure

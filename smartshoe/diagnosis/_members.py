@@ -157,12 +157,13 @@ def _other_laws(
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
-        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:RIVALS])
+        beside = _without(one.name, extended.model)
+        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:RIVALS], beside)
         is_bent = is_beyond_memory(fitted.model, likelihood.thresholds) and not is_stretched(extended.model)
         if is_bent and is_stretched(fit(likelihood, fitted.model).model):
             # An arm as no wall has follows what the law does not: it is weighed beside the arm that was found.
-            beside = _without(one.name, extended.model).with_part(law, fitted.model.part(law.name).values)
-            fitted = fit(likelihood, beside, FEW_STEPS, only=law.name)
+            held = beside.with_part(law, fitted.model.part(law.name).values)
+            fitted = fit(likelihood, held, FEW_STEPS, only=law.name)
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
@@ -220,20 +221,35 @@ def alternatives(evidence: Evidence, best: Posterior, member: int) -> tuple[Alte
 
 
 def fit_with(
-    law: Effect, model: ExtendedModel, likelihood: Likelihood, shapes: Sequence[Mapping[str, float]] = ()
+    law: Effect,
+    model: ExtendedModel,
+    likelihood: Likelihood,
+    shapes: Sequence[Mapping[str, float]] = (),
+    beside: ExtendedModel | None = None,
 ) -> Fit:
     """``model`` with a law: the best of fits from ``shapes``, all of its own where none is given, small and large.
 
-    A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
+    A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs. Nor has a lag
+    about an arm that imitates it: where the arm of ``beside`` is clearly another one, fits begin there as well.
     """
     logged = logged_channels(likelihood.sessions)
-    begun = (law.begun(shape, sizes, logged) for shape in shapes or law.shapes_with(logged) for sizes in SIZES)
-    slopes = [rows_of(model, session)[:, 1:] for session in likelihood.sessions]
+    sizes = [law.begun(shape, sizes, logged) for shape in shapes or law.shapes_with(logged) for sizes in SIZES]
     tried = []
-    for start in (model.with_part(law, values) for values in begun):
-        rows = [_with_own(start, law.name, one, known) for one, known in zip(likelihood.sessions, slopes, strict=True)]
-        tried.append(fit(likelihood, start, 1, rows))
+    for base in (model, *_of_another_arm(beside, model, likelihood)):
+        slopes = [rows_of(base, session)[:, 1:] for session in likelihood.sessions]
+        for start in (base.with_part(law, values) for values in sizes):
+            known = zip(likelihood.sessions, slopes, strict=True)
+            tried.append(fit(likelihood, start, 1, [_with_own(start, law.name, one, own) for one, own in known]))
     return fit(likelihood, min(tried, key=lambda f: f.cost).model, FEW_STEPS)
+
+
+def _of_another_arm(
+    beside: ExtendedModel | None, model: ExtendedModel, likelihood: Likelihood
+) -> Sequence[ExtendedModel]:
+    if beside is None:
+        return ()
+    lower, upper = sorted((beside.relaxation_rate_per_s, model.relaxation_rate_per_s))
+    return (beside,) if upper > likelihood.thresholds.clear * lower else ()
 
 
 def _with_own(model: ExtendedModel, name: str, session: Session, slopes: Array) -> Array:

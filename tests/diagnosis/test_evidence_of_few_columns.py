@@ -39,7 +39,7 @@ def _given(slots: Mapping[str, str] = FAMILIES) -> Linearised:
         target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
         rows.append(np.column_stack([target, columns]))
     candidates: Any = tuple(
-        SimpleNamespace(name=n, columns=c, slot=slots[n], effect=SimpleNamespace(family=FAMILIES[n], is_flexible=False))
+        SimpleNamespace(name=n, columns=c, slot=slots[n], effect=SimpleNamespace(family=FAMILIES[n], why_unnamed=""))
         for n, c in zip(NAMES, COLUMNS, strict=True)
     )
     return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)
@@ -111,6 +111,8 @@ class _Twin:
     ) -> tuple[float, dict[int, Array], dict[int, float]]:
         """-2 log density but for a constant; members' strengths beyond what is immaterial; departures' rms."""
         variances = np.concatenate([[1.0, 1.0], np.full(5, MATERIAL**2)])
+        for own in COLUMNS:  # all columns of an effect add as much together
+            variances[[c - 1 for c in own]] = MATERIAL**2 / len(own)
         columns, spans = [self.z], {}
         for member in (*members, *exact):
             columns.append(self.rows[:, list(COLUMNS[member])])

@@ -80,7 +80,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         prior = np.full(rows.shape[1] - 1, limits.imperfection)
         prior[: given.own] = 1.0
         for one in given.candidates:
-            prior[[c - 1 for c in one.columns]] *= not one.effect.is_flexible
+            prior[[c - 1 for c in one.columns]] *= (not one.effect.why_unnamed) / len(one.columns) ** 0.5
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
         kept = session.fitted

@@ -225,7 +225,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     near = [Alternative(name, 1.0) for name in ("orifice_leak", "zero_drift", "delay", "contact_area")]
     monkeypatch.setattr(_members, "alternatives", lambda *given: (Alternative(None, float(given[2])), *near))
     monkeypatch.setattr(
-        _members, "fit_with", lambda law, model, likelihood, shapes=(): fitted(likelihood, model.with_part(law), 4)
+        _members, "fit_with", lambda law, model, likelihood, *_: fitted(likelihood, model.with_part(law), 4)
     )
     present = frozenset({"low_loads"})
     monkeypatch.setattr(_members, "excitation_of", lambda *given: SimpleNamespace(tells_apart=present))
@@ -290,6 +290,12 @@ def test_a_law_is_fitted_from_all_its_shapes_small_and_large(monkeypatch: pytest
     few = law.shapes[1:3]
     fit_with(law, MODEL, unlogged, few)
     assert [start for start, _ in begun[:-1]] == [tuple(law.begun(one, sizes)) for one in few for sizes in (0.5, 5, 20)]
+    # Beside an arm that is clearly another one each begins once more.
+    limited: Any = SimpleNamespace(sessions=[], thresholds=STANDARD)
+    for times, count in ((1.9, 1), (1.0 / 1.9, 1), (2.1, 2), (1.0 / 2.1, 2)):
+        begun.clear()
+        fit_with(law, MODEL, limited, few, replace(MODEL, relaxation_rate_per_s=times * MODEL.relaxation_rate_per_s))
+        assert len(begun) == 1 + count * 3 * len(few)
 
 
 def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -310,15 +316,16 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
     assert asked == [(4,)]
     tried: list[Any] = []
 
-    def fitted(law: Any, model: Any, likelihood: Any, shapes: Any) -> Any:
+    def fitted(law: Any, model: Any, likelihood: Any, shapes: Any, beside: Any) -> Any:
         tried.append((law.name, list(shapes)))
+        assert beside.names == ()
         return SimpleNamespace(cost=110.0, model=model)
 
     monkeypatch.setattr(_members, "fit_with", fitted)
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
     less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
     one: Any = SimpleNamespace(name="power_law_creep", effect=effect("power_law_creep"))
-    extended: Any = SimpleNamespace(cost=100.0)
+    extended: Any = SimpleNamespace(cost=100.0, model=MODEL.with_part("power_law_creep"))
     (other,) = _other_laws(one, less, extended, found, is_ended=False)
     assert (other.effect, other.margin) == (law.name, 10.0)
     assert tried == [(law.name, [shapes[2], shapes[0]])]
