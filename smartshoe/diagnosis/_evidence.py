@@ -5,7 +5,7 @@ With the reading's residual y, in standard deviations of what counts as noise, a
     y = X0 b + sum over all candidates x_j s_j + sum over e in S ( x_e a_e + Phi_e w_e ) + noise
 
 * b ~ N(0, 1), the baseline's own changes: anything up to full scale, which is flat;
-* s_j ~ N(0, imperfection^2): what is immaterial may always be there, by any law, and needs no name;
+* s_j ~ N(0, imperfection^2): what is immaterial may always be there, of any kind, and needs no name;
 * a_e ~ N(0, strength_sd^2): the effects in S (spike and slab: George and McCulloch 1993);
 * w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
   directions in which equations of its kind depart (Kennedy and O'Hagan 2001).
@@ -122,9 +122,8 @@ class Evidence:
         self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.imperfection)
         self._sds[: given.own] = 1.0
         for one in given.candidates:
-            places = np.array(one.columns) - 1
-            # As much by all columns of an effect; what no law does is no small imperfection of a good unit.
-            self._sds[places] = 0.0 if one.effect.why_unnamed else self.thresholds.imperfection / math.sqrt(places.size)
+            if one.effect.why_unnamed:  # what no law does is no small imperfection of a good unit
+                self._sds[np.array(one.columns) - 1] = 0.0
         inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
         inner.flat[:: inner.shape[0] + 1] += 1.0
         self._factor = _factor(inner)

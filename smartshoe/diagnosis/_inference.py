@@ -50,8 +50,9 @@ class Inference:
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
     ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
     one is idle, and others undo one another without it. ``alone``: the effect that does most by itself, where no
-    member is sure. ``own_gains``: those of the recordings, where they differ by them; ``zero_changes``: when their
-    zeros change.
+    member is sure. ``nearest``: where there is no member, an effect that alone follows most of what the baseline
+    leaves, with rms of that and of what it leaves itself, shares of full scale. ``own_gains``: those of the recordings,
+    where they differ by them; ``zero_changes``: when their zeros change.
     """
 
     baseline: Fit
@@ -63,6 +64,7 @@ class Inference:
     can_validate: bool = True
     undone: tuple[str, ...] = ()
     alone: Effect | None = None
+    nearest: tuple[Effect, float, float] | None = None
     own_gains: tuple[OwnGain, ...] = ()
     zero_changes: tuple[ZeroChange, ...] = ()
 
@@ -117,7 +119,10 @@ def infer(
         if best_alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
             found = best_alone[1]
             members, refused = found.members(), tuple(name for name in refused if name not in found.fit.model.names)
-    return Inference(plain, found.fit, members, screening, likeness, refused, undone=found.undone, alone=alone)
+    nearest = None if members else _nearest(begun, plain, sessions)
+    return Inference(
+        plain, found.fit, members, screening, likeness, refused, undone=found.undone, alone=alone, nearest=nearest
+    )
 
 
 def _beside_own(
@@ -292,6 +297,25 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
         if not validated.is_stepped_down and removed > thresholds.tolerable**2:
             standing.append((begun.given.candidates[k].effect, validated))
     return min(standing, key=lambda one: float(left_out.errors(one[1].fit.model).sum()), default=None)
+
+
+def _nearest(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, float, float] | None:
+    """The law that alone leaves least of what is more than tolerable, and what is left without and with it.
+
+    None where that is not clearly less. It has no more evidence than small imperfections of all kinds together have.
+    """
+    before, thresholds = error_of(sessions, plain.model), begun.thresholds
+    if before <= thresholds.tolerable:
+        return None
+    likelihood, left = begun.likelihood(), []
+    for k in additions(begun.evidence, begun.start, 2 * BREADTH):
+        one = begun.given.candidates[k]
+        if not one.effect.is_flexible:
+            best = begun.evidence.posterior((*begun.start, k))
+            fitted = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood), FEW_STEPS)
+            left.append((error_of(sessions, fitted.model), one.effect))
+    least, effect = min(left, key=lambda pair: pair[0], default=(before, None))
+    return (effect, before, least) if effect is not None and thresholds.clear * least**2 <= before**2 else None
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

@@ -306,6 +306,19 @@ def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
     return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 
 
+def nearest_of(found: Inference, thresholds: Thresholds) -> list[str]:
+    """What is said of a law that follows most of what no cause accounts for, and is not named."""
+    if found.nearest is None:
+        return []
+    effect, left, beside = found.nearest
+    return [
+        f"{in_words(effect.name)} alone follows most of it (where it was fitted {100 * left:.2g} % of full scale is"
+        f" off, {100 * beside:.2g} % with it), and so may small imperfections of many kinds,"
+        f" {100 * thresholds.imperfection:.2g} % each, so that it is not named: if this unit is better than that, ask"
+        f" for less than {100 * thresholds.material:.2g} % as material"
+    ]
+
+
 def refusals_of(found: Inference) -> list[str]:
     """What is said of effects that are not named for what others do: taken out again, or undone by one another."""
     if not found.can_validate:

@@ -30,6 +30,7 @@ from smartshoe.diagnosis._limits import (
     bent_to_the_end_of,
     elsewhere_of,
     end_of_range_of,
+    nearest_of,
     own_gains_of,
     own_zeros_of,
     refusals_of,
@@ -290,7 +291,8 @@ def _limits_of_the_names(found: Inference, given: Prepared, named: Chosen, exten
         bent_to_the_end_of(extended),
         wall_ratio_of(extended, given.sessions, given.thresholds),
     )
-    return (*named.limits, *(said for said in of_model if said is not None), *refusals_of(found))
+    near = nearest_of(found, given.thresholds)
+    return (*named.limits, *(said for said in of_model if said is not None), *near, *refusals_of(found))
 
 
 def _left_of_what_was_fitted(

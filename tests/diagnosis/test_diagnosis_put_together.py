@@ -108,7 +108,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
         can_validate=True, refused=(), undone=(), alone=None, screening=SCREENING,
-        likeness=np.eye(6), own_gains=(), zero_changes=(),
+        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest=None,
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size = "memory", 0.07

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from itertools import combinations
 
@@ -94,8 +93,8 @@ class _Twin:
         sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.imperfection)
         sds[: self.given.own] = 1.0
         for one in self.given.candidates:
-            # All columns of an effect add as much; what no law does is no small imperfection.
-            sds[[c - 1 for c in one.columns]] *= (not one.effect.why_unnamed) / math.sqrt(len(one.columns))
+            if one.effect.why_unnamed:  # what no law does is no small imperfection
+                sds[[c - 1 for c in one.columns]] = 0.0
         for member in members:
             sds[[c - 1 for c in self.given.candidates[member].columns]] = self.given.thresholds.strength_sd
         return sds

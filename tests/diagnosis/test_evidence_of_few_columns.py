@@ -111,8 +111,6 @@ class _Twin:
     ) -> tuple[float, dict[int, Array], dict[int, float]]:
         """-2 log density but for a constant; members' strengths beyond what is immaterial; departures' rms."""
         variances = np.concatenate([[1.0, 1.0], np.full(5, MATERIAL**2)])
-        for own in COLUMNS:  # all columns of an effect add as much together
-            variances[[c - 1 for c in own]] = MATERIAL**2 / len(own)
         columns, spans = [self.z], {}
         for member in (*members, *exact):
             columns.append(self.rows[:, list(COLUMNS[member])])

@@ -93,7 +93,7 @@ def _density(given: Linearised, sessions: list[Session], member: int | None) -> 
     prior = np.full(given.rows[0].shape[1] - 1, STANDARD.imperfection)
     prior[: given.own] = 1.0
     for one in given.candidates:
-        prior[[c - 1 for c in one.columns]] *= (not one.effect.why_unnamed) / len(one.columns) ** 0.5
+        prior[[c - 1 for c in one.columns]] *= not one.effect.why_unnamed
     if member is not None:
         prior[[c - 1 for c in given.candidates[member].columns]] = STANDARD.strength_sd
     z = np.concatenate([rows[s.fitted, 1:] * prior for rows, s in zip(given.rows, sessions, strict=True)])

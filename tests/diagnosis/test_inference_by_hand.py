@@ -134,6 +134,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "_validated", judged)
     monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
     monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
+    monkeypatch.setattr(_inference, "_nearest", lambda *given: "nearest")
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
     monkeypatch.setattr(_inference, "likelier", likelier)
     monkeypatch.setattr(_inference, "_is_likelier", lambda other, found: other.fit.model not in told.unlikely)
@@ -148,6 +149,7 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
         assert (found.screening, found.likeness) == ("screening", "likeness")
+        assert found.nearest is None  # nothing may be named, whatever fits
         assert found.baseline is found.fit
 
 

@@ -116,9 +116,7 @@ def test_sound_units_are_told_two_clocks_where_there_are_two(protocol: str, by_s
 def test_a_sound_unit_of_which_one_recording_is_late_is_as_good_as_another(protocol: str) -> None:
     case = _sound(protocol)
     found = diagnose([_late(case.recordings[0], 0.1), case.recordings[1]], case.hold_out)
-    in_time = diagnose(case.recordings, case.hold_out)
-    assert found.verdict == in_time.verdict
-    assert [one.name for one in found.causes] == [one.name for one in in_time.causes]
+    assert (found.verdict, found.causes) == ("adequate", ())
     (said,) = [fault.says for fault in found.data_faults if fault.kind == "two_clocks"]
     assert "the reading is 0.10 s late, more than in the other recordings" in said
     assert "s earlier to the load's clock before anything else" in found.limits[0]
