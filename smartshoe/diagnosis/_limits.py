@@ -312,8 +312,8 @@ def nearest_of(found: Inference, thresholds: Thresholds) -> list[str]:
         return []
     effect, left, beside = found.nearest
     return [
-        f"{in_words(effect.name)} alone follows most of it (where it was fitted {100 * left:.2g} % of full scale is"
-        f" off, {100 * beside:.2g} % with it), and so may small imperfections of many kinds,"
+        f"{in_words(effect.name)} alone follows most of what the baseline misses ({100 * left:.2g} % of full scale"
+        f" where it was fitted, {100 * beside:.2g} % with it), and so may small imperfections of many kinds,"
         f" {100 * thresholds.imperfection:.2g} % each, so that it is not named: if this unit is better than that, ask"
         f" for less than {100 * thresholds.material:.2g} % as material"
     ]

@@ -233,11 +233,11 @@ def fit_with(
     about an arm that imitates it: where the arm of ``beside`` is clearly another one, fits begin there as well.
     """
     logged = logged_channels(likelihood.sessions)
-    sizes = [law.begun(shape, sizes, logged) for shape in shapes or law.shapes_with(logged) for sizes in SIZES]
+    begun = [law.begun(shape, sizes, logged) for shape in shapes or law.shapes_with(logged) for sizes in SIZES]
     tried = []
     for base in (model, *_of_another_arm(beside, model, likelihood)):
         slopes = [rows_of(base, session)[:, 1:] for session in likelihood.sessions]
-        for start in (base.with_part(law, values) for values in sizes):
+        for start in (base.with_part(law, values) for values in begun):
             known = zip(likelihood.sessions, slopes, strict=True)
             tried.append(fit(likelihood, start, 1, [_with_own(start, law.name, one, own) for one, own in known]))
     return fit(likelihood, min(tried, key=lambda f: f.cost).model, FEW_STEPS)

@@ -28,12 +28,9 @@ from smartshoe.models.effects.exposure import CHANNELS, WORDS
 from smartshoe.models.elements import Arm
 
 SAID = ("name", "family", "stage", "place", "says", "parameters")
-SHORT, LONG = (32, 0.02), (3000, 0.01)
-"""Samples, and the step between them in s, of the signals that an effect is tried on."""
+SHORT, LONG = (32, 0.02), (3000, 0.01)  # samples, and the step between them in s, of what an effect is tried on
 RELAXING = (0.06, 0.2)
-IDENTITY = (
-    1e-9  # a share of full scale: an effect at its null values, or an inverse on a stream that is cut, differs less
-)
+IDENTITY = 1e-9  # of full scale: from its input, an effect at its null, or an inverse on a cut stream, differs less
 
 
 def refuse_faulty(made: Effect, origin: str) -> None:
