@@ -11,7 +11,6 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
-from smartshoe.signals.scales import power_of_two
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,9 +210,8 @@ def _by_line(x: Array, y: Array) -> float:
 
 
 def _explained(values: Array, by: Array) -> float:
-    scale = power_of_two(values)
-    whole = float(np.var(scale * values))
-    return 1.0 - float(np.var(scale * (values - by))) / whole if whole > 0 else 0.0
+    whole = float(np.var(values))
+    return 1.0 - float(np.var(values - by)) / whole if whole > 0 else 0.0
 
 
 def _slope(place: Array, level: Array, among: Mask) -> float:

@@ -187,8 +187,8 @@ class Gain:
 
 def _beyond(more: float, less: float, scale: Scale) -> float:
     """Rms, a share of full scale, of what ``more`` holds beside ``less``; 0 where it holds no more."""
-    span = abs(scale.reading)
-    return math.sqrt(max((more / span) ** 2 - (less / span) ** 2, 0.0))
+    square = more**2 - less**2
+    return math.sqrt(square) / abs(scale.reading) if square > 0.0 else 0.0
 
 
 def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds) -> Gain:

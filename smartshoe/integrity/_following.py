@@ -12,7 +12,6 @@ from smartshoe.integrity._held import frozen
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.lags import lagged
-from smartshoe.signals.scales import power_of_two
 
 RISES_WITH_LOAD = ("pressure", "force")
 
@@ -80,10 +79,9 @@ def _followed_share(view: View) -> tuple[float, float]:
     n = view.reading.values.size
     width = max(1, n // view.thresholds.bins)
     count = n // width
-    load_scale, scale = (power_of_two(one.values) for one in (view.load, view.reading))
-    load = (load_scale * view.load.values[: count * width]).reshape(count, width).mean(axis=1)
-    reading = np.median((scale * view.reading.values[: count * width]).reshape(count, width), axis=1)
-    curve = np.interp(load, load_scale * view.curve[0], scale * view.curve[1])
+    load = view.load.values[: count * width].reshape(count, width).mean(axis=1)
+    reading = np.median(view.reading.values[: count * width].reshape(count, width), axis=1)
+    curve = np.interp(load, view.curve[0], view.curve[1])
     columns = np.concatenate([of_load(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1)
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
     if float(np.std(_beyond(load, base))) < view.thresholds.standing * float(np.ptp(load)):

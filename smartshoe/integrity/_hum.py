@@ -13,7 +13,6 @@ from smartshoe.integrity._view import View, toggling
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import MAINS_HZ, robust_sd
-from smartshoe.signals.scales import power_of_two
 
 HARMONICS = 3  # that a line is called by: half and twice as many changed no finding
 
@@ -88,8 +87,7 @@ def _quiet_stretches(view: View) -> list[tuple[int, int]]:
     noise = view.load.quiet_noise
     moves = given.still_per_s * view.load_span * block * view.step_s
     still = np.abs(np.diff(mean)) <= max(moves, largest_of_noise(1, given) * np.sqrt(2.0 / block) * noise)
-    scale = power_of_two(blocks)
-    calm = (scale * blocks).std(axis=1) / scale <= moves + given.clear * noise  # a sine of four cycles a second is not
+    calm = blocks.std(axis=1) <= moves + given.clear * noise  # a sine of four cycles a second is not
     still &= calm[1:] & calm[:-1]
     gap = np.flatnonzero(view.gap | (view.jump != 0.0)) // block
     still[np.minimum(gap, still.size - 1)] = False
@@ -143,8 +141,7 @@ def _strongest(
     from scipy.fft import next_fast_len, rfft
     from scipy.ndimage import median_filter
 
-    n, scale = residual.size, power_of_two(residual)
-    residual = scale * residual
+    n = residual.size
     size = 2 * int(next_fast_len((n + 1) // 2, real=True))
     power = np.abs(rfft(residual, size)) ** 2
     frequency = np.fft.rfftfreq(size, view.step_s)
@@ -180,14 +177,14 @@ def _strongest(
                 weights.append(total)
                 noise_power.append(level * float(np.dot(weight[a:b], weight[a:b])) / total**2)
     amplitude = max(abs(whole), float(np.median(own)))
-    step, noise = scale * view.reading.step, scale * float(np.median(view.reading.noise[weight > 0.0]))
+    step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
     # From peak to peak it must be material; the first line of a toggling between two levels has 2/pi of a step.
-    least = max(0.5 * given.material * scale * view.span, 2.0 / np.pi * step if noise < toggling(given) * step else 0.0)
+    least = max(0.5 * given.material * view.span, 2.0 / np.pi * step if noise < toggling(given) * step else 0.0)
     steady = halves[0] < given.clear**2 * halves[1]  # first halves of the stretches against second ones: ringing dies
     if amplitude < least or not steady or given.clear**2 * abs(whole) < amplitude:  # mains wander a little
         return None
     from_mains = aliases(float(frequency[best]), 1.0 / view.step_s, float(n * view.step_s))
     if not from_mains and not _lasts(abs(whole), np.array(own), np.array(weights), np.array(noise_power), given):
         return None
-    course: Array = np.real(whole * np.conj(carrier)) / scale
-    return float(frequency[best]), float(amplitude) / scale, course
+    course: Array = np.real(whole * np.conj(carrier))
+    return float(frequency[best]), float(amplitude), course

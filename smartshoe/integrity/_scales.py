@@ -9,7 +9,6 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.noise import NORMAL_QUARTILE
-from smartshoe.signals.scales import power_of_two
 
 SECOND_DIFFERENCE = math.sqrt(6.0)  # standard deviation of white noise's, over the noise's own
 ROUNDING = float(np.sqrt(np.finfo(float).eps))  # of a number: what differs by less differs by rounding
@@ -39,8 +38,7 @@ def local_scale(deviation: Array, thresholds: Thresholds, step: float = 0.0) -> 
     size = np.abs(deviation[: blocks * block]) if n >= block else np.abs(deviation)
     size = size.reshape(blocks, -1)
     limit = thresholds.clear / NORMAL_QUARTILE * np.median(size, axis=1, keepdims=True) + step
-    scale = power_of_two(size)
-    body = np.sqrt(np.mean((scale * np.minimum(size, limit)) ** 2, axis=1)) / scale / _cut_short(thresholds.clear)
+    body = np.sqrt(np.mean(np.minimum(size, limit) ** 2, axis=1)) / _cut_short(thresholds.clear)
     wide = body.copy()
     wide[1:] = np.maximum(wide[1:], body[:-1])
     wide[:-1] = np.maximum(wide[:-1], body[1:])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from smartshoe.arrays import Array, Index
@@ -13,7 +11,6 @@ from smartshoe.integrity._view import Signal
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import UNIFORM_SD
-from smartshoe.signals.scales import power_of_two
 
 
 def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
@@ -32,7 +29,7 @@ def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recordi
         float(np.ptp(channel.values[there])) if there.size else 0.0,
     )
     error = UNIFORM_SD * signal.step
-    if error <= thresholds.material * span or signal.quiet_noise >= math.sqrt(2.0) * error:
+    if error <= thresholds.material * span or signal.quiet_noise**2 >= 2.0 * error**2:
         return recording, []
     logged = _one_value_a_level(signal.values, signal.step)
     if np.max(np.abs(logged - signal.values)) > ROUNDING * np.max(np.abs(logged)):
@@ -110,8 +107,6 @@ def _gain(logged: Array, between: Array, reading: Array) -> float | None:
     By the steps that the load goes through, up or down: at others it may have stood. A load that is sampled once on
     each of them, as a commanded ramp, moves within none: what is left of it there is rounding.
     """
-    of_load, of_reading = power_of_two(logged), power_of_two(reading)
-    logged, between, reading = of_load * logged, of_load * between, of_reading * reading
     gain = float(np.polyfit(logged, reading, 1)[0])
     is_new = np.diff(logged, prepend=np.nan) != 0.0
     way = np.sign(np.diff(logged[is_new]))
@@ -120,8 +115,7 @@ def _gain(logged: Array, between: Array, reading: Array) -> float | None:
     moved, read = (_within(one, visit) * through[visit] for one in (between - logged, reading))
     if np.max(np.abs(moved)) <= ROUNDING * np.max(np.abs(logged)):
         return None
-    goes_with = gain != 0.0 and 2.0 * float(moved @ read) / gain > float(moved @ moved)
-    return of_load * abs(gain) / of_reading if goes_with else None
+    return abs(gain) if gain != 0.0 and 2.0 * float(moved @ read) / gain > float(moved @ moved) else None
 
 
 def _within(values: Array, visit: Index) -> Array:
