@@ -19,7 +19,6 @@ from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
-from smartshoe.signals.scales import power_of_two
 
 STEPS = 4  # of Gauss and Newton: a lag within what the smoothing spans is found in two
 
@@ -62,12 +61,11 @@ def apart_s(
     ends_n = min(float(one.min()) for one in loads), max(float(one.max()) for one in loads)
     if ends_n[0] == ends_n[1]:
         return {}
-    scale = power_of_two(np.concatenate([recordings[place].sensor.si[usable[place]] for place in fitted]))
     runs = {}
     for place in of_use:
         run = _run(recordings[place], usable[place], step_s, ends_n, thresholds)
         if run is not None:
-            runs[place] = replace(run, read=scale * run.read).on(told.shared)
+            runs[place] = run.on(told.shared)
     told_last = sorted((k for k in runs if k in told.own_s), key=lambda k: abs(told.own_s[k]))
     first = [k for k in runs if k < told.fitted and k not in told.own_s]
     found = {} if told.shared else _of_first({place: runs[place] for place in first}, lags, thresholds)

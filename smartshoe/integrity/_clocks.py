@@ -24,7 +24,6 @@ from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
-from smartshoe.signals.scales import power_of_two
 
 # Resolutions: half and twice of each changed no finding in two cases.
 SMOOTHING = (1.0, 3.0, 6.0)  # echoes
@@ -168,10 +167,8 @@ def _followed(view: View, smoothing: Sequence[float] = SMOOTHING) -> _Followed |
     bins = int(min(given.bins, view.time_s.size // 2))
     width_s = duration_s / bins
     grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
-    load, reading = (
-        binned(view.time_s, power_of_two(one.values) * five_point_median(one.values), grid, width_s)
-        for one in (view.load, view.reading)
-    )
+    load = binned(view.time_s, five_point_median(view.load.values), grid, width_s)
+    reading = binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
     for echoes in smoothing:  # as little as the noise allows, since smoothing blunts the edges

@@ -189,7 +189,7 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
     whole = np.ones(len(recording), dtype=bool)
     if (lacking := _lacking(recording)) is not None:
         return _Examined([*findings, Finding.fatal("no_reference", whole, lacking)], usable)
-    if (too_large := _beyond_sums(recording)) is not None:
+    if (too_large := _beyond_squares(recording)) is not None:
         return _Examined([*findings, Finding.fatal("does_not_follow_load", whole, too_large)], usable)
     view = _view(tame.recording, thresholds, ends)
     if view is None:
@@ -239,11 +239,12 @@ def _lacking(recording: Recording) -> str | None:
     return None if readings else f"there is no reading: name its column with --sensor{among}"
 
 
-def _beyond_sums(recording: Recording) -> str | None:
-    """Why nothing can be computed of numbers so large that no number is their sum, or None."""
+def _beyond_squares(recording: Recording) -> str | None:
+    """Why nothing can be computed of numbers so large that squares of their sums of squares are none, or None."""
+    most = (np.finfo(float).max / len(recording) ** 2) ** 0.25
     for channel in (recording.load, recording.sensor):
         largest = float(np.max(np.abs(channel.values), initial=0.0))
-        if not largest < np.finfo(float).max / len(recording) or not np.all(np.isfinite(channel.si)):
+        if not largest * max(channel.unit.scale, 1.0) < most:
             return f"{channel.name} holds numbers up to {largest:.2g}, which are no measurements: give another unit"
     return None
 

@@ -220,11 +220,10 @@ def test_a_day_without_samples_in_a_recording_is_no_matter() -> None:
 
 
 # -- large numbers ----------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("size", [1e-300, 1e150, 1e300])
+@pytest.mark.parametrize("size", [1e-60, 1e60])
 @pytest.mark.parametrize("of_load", [False, True])
 @pytest.mark.filterwarnings("error")
 def test_numbers_of_any_size_tell_the_same(size: float, of_load: bool) -> None:
-    """Squares of them may be no numbers."""
     plain = [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
     large = []
     for one in plain:
@@ -239,14 +238,15 @@ def test_numbers_of_any_size_tell_the_same(size: float, of_load: bool) -> None:
 @pytest.mark.filterwarnings("error")
 def test_a_reading_of_large_numbers_is_as_good_as_another() -> None:
     runs = [_run(0.0, seed) for seed in (1, 2)]
-    large = [one.with_channel(one.sensor.with_values(1e200 * one.sensor.values)) for one in runs]
+    large = [one.with_channel(one.sensor.with_values(1e60 * one.sensor.values)) for one in runs]
     plain, found = diagnose(runs), diagnose(large)
     assert found.verdict == plain.verdict
     assert [one.name for one in found.causes] == [one.name for one in plain.causes]
 
 
-@pytest.mark.filterwarnings("ignore")
-def test_numbers_whose_sums_are_none_are_refused() -> None:
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e80, 1e150])
+def test_numbers_whose_squares_are_none_are_refused(size: float) -> None:
     run = _run(0.0, 1)
-    (said,) = examine([run.with_channel(run.sensor.with_values(1e306 * run.sensor.values))], STANDARD).refusals
+    (said,) = examine([run.with_channel(run.sensor.with_values(size * run.sensor.values))], STANDARD).refusals
     assert "which are no measurements: give another unit" in said
