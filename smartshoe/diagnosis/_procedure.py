@@ -122,7 +122,8 @@ def diagnosed(
         not_explained_of(rest, 0.0 if won.is_rejected else outcome.elsewhere, outcome.unproven, thresholds),
         thresholds,
         worse=won.is_loss,
-        withheld=_is_silent(found, given) or bool(named.limits or found.zero_changes or found.own_gains),
+        withheld=_is_silent(found, given)
+        or bool(named.limits or found.zero_changes or found.own_gains or found.nearest),
     )
     return Diagnosis(
         verdict,

@@ -19,7 +19,6 @@ from smartshoe.models.effects import effect, listed, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
-    FORCE_MAY_BE_OFF,
     Row,
     comparison,
     gain_sentence,
@@ -188,7 +187,7 @@ def test_a_force_that_the_extended_model_gives_back_worse_is_the_baselines() -> 
     for plain_model in (BASELINE, with_zero):
         assert row(plain_model).before == own.before
         assert (row(plain_model).after, row(plain_model).change) == (
-            f"by the baseline: see {FORCE_MAY_BE_OFF}",
+            "by the baseline, see below",
             "",
         )
     # One effect is passed over and others are undone: it is no baseline, and its error is that of the result.

@@ -41,7 +41,6 @@ LIKELIHOOD = (
     "“Less likely by” and “fits worse by” are differences of −2 log likelihood. “Less likely by 10” is strong evidence."
     " “Fits worse by” takes equations as exact, which they are not, so that it must be much more than 10."
 )
-FORCE_MAY_BE_OFF = "where the calibration's force may be off"
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
 
 
@@ -239,7 +238,7 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
             Row(
                 "error of the compensated force, rms" + _but_for_clipped(diagnosis),
                 f"{plain(before.force_rmse_n)} N",
-                f"by the baseline: see {FORCE_MAY_BE_OFF}" if by_baseline else f"{plain(after.force_rmse_n)} N",
+                "by the baseline, see below" if by_baseline else f"{plain(after.force_rmse_n)} N",
                 "" if by_baseline else _change(before.force_rmse_n, after.force_rmse_n),
             )
         )

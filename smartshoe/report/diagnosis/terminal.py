@@ -14,7 +14,6 @@ from smartshoe.display import sure
 from smartshoe.models.effects import in_words, listed
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.report.diagnosis._sentences import (
-    FORCE_MAY_BE_OFF,
     LIKELIHOOD,
     comparison,
     fault_text,
@@ -63,7 +62,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
     of_the_force = diagnosis.limits_of_the_force
     others = [one for one in diagnosis.limits_of_the_rest if one not in of_the_force]
-    _several(console, FORCE_MAY_BE_OFF, of_the_force, most=None)
+    _several(console, "where the calibration's force may be off", of_the_force, most=None)
     _several(console, "limits of this data", others, most=None)
     _several(console, "recordings that were left out", diagnosis.left_out)
     if diagnosis.next_experiment is not None:
