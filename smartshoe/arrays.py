@@ -21,7 +21,7 @@ def numbers_of(values: ArrayLike, what: str) -> Array:
     None among them counts as NaN, as in a table read elsewhere.
     """
     try:
-        given = values if hasattr(values, "dtype") else np.asarray(values)
+        given: Any = values if hasattr(getattr(values, "dtype", None), "kind") else np.asarray(values)
         kinds = {given.dtype.kind}
         if "O" in kinds:
             of_each_type = {type(one): one for one in np.ravel(given) if one is not None}
@@ -34,7 +34,7 @@ def numbers_of(values: ArrayLike, what: str) -> Array:
             raise TypeError("text")
         if values is None:
             raise TypeError("None")
-        return np.asarray(values, dtype=float)
+        return np.asarray(given, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what}: not all are real numbers ({error}): give these, NaN where one is missing") from error
 

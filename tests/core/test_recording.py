@@ -74,6 +74,18 @@ def test_time_that_is_no_number_of_seconds_is_refused(time_s: object) -> None:
         Recording.from_arrays(time_s=np.arange(3), force_n=time_s)  # type: ignore[arg-type]
 
 
+def test_columns_of_other_libraries_are_numbers_whatever_their_dtype_is() -> None:
+    """One of polars or torch has a dtype that is none of numpy's."""
+
+    class Column:
+        dtype = "Float64"
+
+        def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
+            return np.array([0.0, 1.0, 2.0])
+
+    assert Recording.from_arrays(time_s=Column(), force_n=Column()).force_n.tolist() == [0.0, 1.0, 2.0]  # type: ignore[arg-type]
+
+
 def test_a_column_without_a_unit_is_refused() -> None:
     with pytest.raises(UnitError, match="pressure"):
         Recording.from_arrays(time_s=[0, 1], pressure=[0, 1])
