@@ -21,7 +21,7 @@ from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
 from smartshoe.diagnosis._neighbours import neighbours_of
 from smartshoe.diagnosis._scale import Scale, reading_in
-from smartshoe.diagnosis._slow_stretches import between_samples
+from smartshoe.diagnosis._slow_stretches import spacing_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects.cycle_conditioning import half_way
@@ -320,8 +320,8 @@ def _logged(recording: Recording, usable: Mask, scale: Scale, longest_s: float, 
     even = np.asarray(step_s * np.arange(int(time_s[-1] / step_s) + 1), dtype=np.float64)
     nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
     is_near = np.abs(time_s[nearest] - even) < step_s
-    followed = (between_samples(time_s, even, one, longest_s, thresholds)[0] for one in (good, known))
-    good, known = (one[nearest] & is_near | more for one, more in zip((good, known), followed, strict=True))
+    spacing = spacing_of(time_s, even, longest_s, thresholds)
+    good, known = (one[nearest] & is_near | spacing.followed(one) for one in (good, known))
     return _Logged(
         even,
         np.interp(even, time_s, load_n),

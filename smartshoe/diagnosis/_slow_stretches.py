@@ -2,23 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 from smartshoe.signals.masks import runs_of
 
 
-def between_samples(
-    time_s: Array, at_s: Array, good: Mask, longest_s: float, thresholds: Thresholds
-) -> tuple[Mask, Mask]:
-    """(m,) each: moments ``at_s`` (m,) between two ``good`` samples (n,) as evenly apart as those about them.
+@dataclass(frozen=True, eq=False)
+class Spacing:
+    """Moments (m,) between samples: the next sample ``after`` each, and of the two about it whether they are close.
 
-    Those of which these are no more than ``longest_s`` apart, and those of which they are farther apart. One that
-    stands between samples farther apart than those about them is in a gap, and neither.
+    ``is_close``: near enough for fits to follow. ``is_even``: as far apart as those about them, else it is in a gap.
     """
+
+    after: Index
+    is_even: Mask
+    is_close: Mask
+
+    def followed(self, good: Mask) -> Mask:
+        """(m,) moments between two ``good`` samples (n,) that fits can follow."""
+        return self._between(good) & self.is_close
+
+    def too_slow(self, good: Mask) -> Mask:
+        """(m,) moments between two ``good`` samples (n,) that are too far apart for that."""
+        return self._between(good) & ~self.is_close
+
+    def _between(self, good: Mask) -> Mask:
+        return self.is_even & good[self.after] & good[self.after - 1]
+
+
+def spacing_of(time_s: Array, at_s: Array, longest_s: float, thresholds: Thresholds) -> Spacing:
+    """How samples at ``time_s`` (n,) lie about moments ``at_s`` (m,), close where no more than ``longest_s`` apart."""
     from scipy.ndimage import maximum_filter1d, median_filter
 
     step_s = np.diff(time_s)
@@ -26,9 +45,7 @@ def between_samples(
     usual_s = maximum_filter1d(median_filter(step_s, thresholds.local, mode="nearest"), thresholds.local + 1)
     is_even = step_s <= (1.0 + thresholds.same) * usual_s
     after = np.clip(np.searchsorted(time_s, at_s), 1, time_s.size - 1)
-    is_even = (is_even & good[1:] & good[:-1])[after - 1] & (at_s <= time_s[-1])
-    is_close = step_s[after - 1] <= longest_s
-    return is_even & is_close, is_even & ~is_close
+    return Spacing(after, is_even[after - 1] & (at_s <= time_s[-1]), step_s[after - 1] <= longest_s)
 
 
 def too_slow_of(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> str | None:
@@ -38,7 +55,7 @@ def too_slow_of(recording: Recording, usable: Mask, longest_s: float, thresholds
     time_s, step_s = recording.time_s, recording.sample_time_s
     at_s = np.arange(time_s[0], time_s[-1], step_s)
     good = usable & recording.sensor.present & recording.load.present
-    slow = between_samples(time_s, at_s, good, longest_s, thresholds)[1]
+    slow = spacing_of(time_s, at_s, longest_s, thresholds).too_slow(good)
     if not slow.any():
         return None
     first, last = (ends[place] for ends, place in zip(runs_of(slow), (0, -1), strict=True))

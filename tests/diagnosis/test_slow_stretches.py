@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._prepared import prepared
-from smartshoe.diagnosis._slow_stretches import between_samples, too_slow_of
+from smartshoe.diagnosis._slow_stretches import spacing_of, too_slow_of
 from smartshoe.integrity import examine
 from smartshoe.recording import Recording
 
@@ -21,10 +21,15 @@ def _stamps(*stretches: tuple[int, float]) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.concatenate([np.full(count, step) for count, step in stretches]))])
 
 
+def _seen(time_s: Array, at_s: Array, good: NDArray[np.bool_], longest_s: float) -> list[NDArray[np.bool_]]:
+    spacing = spacing_of(time_s, at_s, longest_s, STANDARD)
+    return [spacing.followed(good), spacing.too_slow(good)]
+
+
 def test_moments_between_samples_as_far_apart_as_those_about_them_are_known() -> None:
     time_s = _stamps((200, 0.01), (200, 0.03), (200, 0.05))
     at_s = np.arange(0.0, time_s[-1], 0.01)
-    near, far = between_samples(time_s, at_s, np.ones(time_s.size, dtype=bool), 0.035, STANDARD)
+    near, far = _seen(time_s, at_s, np.ones(time_s.size, dtype=bool), 0.035)
     assert np.array_equal(near, at_s <= 8.0 + 1e-9)
     assert np.array_equal(far, ~near)
 
@@ -33,7 +38,7 @@ def test_moments_between_samples_as_far_apart_as_those_about_them_are_known() ->
 def test_what_is_missing_in_an_even_stretch_is_a_gap_and_not_slow(step_s: float) -> None:
     time_s = np.delete(_stamps((500, step_s), (20, 0.01)), [100, 101, 300])
     at_s = np.arange(0.0, time_s[-1], 0.01)
-    near, far = between_samples(time_s, at_s, np.ones(time_s.size, dtype=bool), 1.0, STANDARD)
+    near, far = _seen(time_s, at_s, np.ones(time_s.size, dtype=bool), 1.0)
     lacking = ((at_s > 99.0 * step_s) & (at_s < 102.0 * step_s)) | ((at_s > 299.0 * step_s) & (at_s < 301.0 * step_s))
     assert np.mean(near != ~lacking) < 0.005  # stamps are rounded
     assert not far.any()
@@ -43,7 +48,7 @@ def test_nor_is_known_what_lies_beside_a_sample_that_is_at_fault() -> None:
     time_s = _stamps((300, 0.03))
     good = np.arange(time_s.size) != 100
     at_s = np.array([2.985, 3.015, 2.96, 3.04])
-    near, far = between_samples(time_s, at_s, good, 0.035, STANDARD)
+    near, far = _seen(time_s, at_s, good, 0.035)
     assert near.tolist() == [False, False, True, True]
     assert not far.any()
 
