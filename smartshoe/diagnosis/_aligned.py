@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._scale import moves_with
 from smartshoe.integrity import Integrity, OneClock
 from smartshoe.models.effects import Effect, between_clocks
 from smartshoe.recording import Recording
@@ -72,15 +73,21 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
     return Aligned(made, usable, (parting, late) if borne.rate else (late,), tuple(says), places, frozenset(moved))
 
 
-def as_they_follow(recordings: Sequence[Recording], shared: OneClock | None) -> list[Recording]:
-    """``recordings`` with each reading at the moment whose load it follows, by the lag that all of them ``shared``."""
+def as_they_follow(recordings: Sequence[Recording], usable: Sequence[Mask], shared: OneClock | None) -> list[Recording]:
+    """``recordings`` with each reading at the moment whose load it follows, by the lag that all of them ``shared``.
+
+    Unless they follow their loads more as they are: what relaxes in long holds falls behind them as though it were late
+    and turned over.
+    """
+    as_read = [*recordings]
     if shared is None:
-        return [*recordings]
+        return as_read
     offsets_s = (shared.before_s + 0.5 * shared.rate * one.duration_s for one in recordings)
-    return [
+    moved = [
         _on_one_clock(one, one.sensor.present, offset_s, shared.rate)[0]
         for one, offset_s in zip(recordings, offsets_s, strict=True)
     ]
+    return max(as_read, moved, key=lambda some: abs(moves_with(some, usable)))
 
 
 def _is_load_known(recording: Recording, clock: OneClock) -> Mask:

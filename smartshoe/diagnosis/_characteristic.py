@@ -11,6 +11,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
+from smartshoe.signals.lags import lagged
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +125,40 @@ def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
     return True
 
 
+def _fades(found: Branches, thresholds: Thresholds) -> bool:
+    """Whether the reading fades while the load stands, as charge does; friction stays there, or is gone at once.
+
+    Then a line of the load and of what fades from it leaves clearly less there than the branches do.
+    """
+    strokes = _strokes_of(found.recording, thresholds)
+    if strokes is None:
+        return False
+    still = np.abs(strokes.rate) <= strokes.still
+    if np.count_nonzero(still) < thresholds.least_samples:
+        return False
+    moved = np.maximum.accumulate(np.where(still, 0, np.arange(still.size)))
+    ups, downs, mean = (np.interp(strokes.load, found.place, one) for one in (found.ups, found.downs, found.mean))
+    branches = [np.where(strokes.rate[moved] > 0.0, ups, downs), mean]
+    faded = [
+        _line_of(
+            np.column_stack([strokes.load, lagged(strokes.load, found.recording.sample_time_s, memory_s)]), strokes
+        )
+        for memory_s in thresholds.memory_s
+    ]
+    of_branches, of_faded = (
+        min(float(np.var((strokes.reading - one)[still])) for one in some) for some in (branches, faded)
+    )
+    return thresholds.clear * of_faded < of_branches
+
+
+def _line_of(columns: Array, strokes: _Strokes) -> Array:
+    """(n,) the reading, as columns (n, k) and a constant follow it best."""
+    with_constant = np.column_stack([np.ones(len(columns)), columns])
+    return np.asarray(with_constant @ np.linalg.lstsq(with_constant, strokes.reading, rcond=None)[0])
+
+
 def _friction(found: Branches, thresholds: Thresholds) -> str | None:
-    if not _comes_back(found.recording, thresholds):
+    if not _comes_back(found.recording, thresholds) or _fades(found, thresholds):
         return None
     sensor = found.recording.sensor
     half = 0.5 * found.apart

@@ -52,11 +52,12 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
-    following = as_they_follow(clocks.recordings[:count], None if is_moved else integrity.one_clock)
-    scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds, following)
+    fitted, usable = clocks.recordings[:count], clocks.usable[:count]
+    following = as_they_follow(fitted, usable, None if is_moved else integrity.one_clock)
+    scale = full_scale(fitted, usable, thresholds, following)
     held = held_out if any(held_out) else None
-    factors = thinning(clocks.recordings[:count], scale, thresholds)
-    clocks, said_of_length = _first_parts(clocks, fitted_lengths(clocks.recordings[:count], factors))
+    factors = thinning(fitted, scale, thresholds)
+    clocks, said_of_length = _first_parts(clocks, fitted_lengths(fitted, factors))
     sessions = [
         replace(one, index=clocks.places[one.index])
         for one in prepare(clocks.recordings, clocks.usable, held, scale, factors, thresholds)

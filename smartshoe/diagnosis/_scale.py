@@ -64,20 +64,22 @@ def full_scale(
         raise NotIdentifiableError(
             f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
         )
-    slope = sum(_moves_with(one, mask) for one, mask in zip(following or recordings, usable, strict=True))
+    slope = moves_with(following or recordings, usable)
     zero = 0.0
     if unit.quantity != "pressure":
         zero = float(np.median(np.concatenate([values[lowest(force, thresholds)] for force, values in pairs])))
     return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
 
 
-def _moves_with(recording: Recording, usable: Mask) -> float:
+def moves_with(recordings: Sequence[Recording], usable: Sequence[Mask]) -> float:
     """Sum of products of load and reading about their means, over what is usable: negative where one falls."""
-    mask = usable & recording.sensor.present
-    if not mask.any():
-        return 0.0
-    force, values = recording.force_n[mask], recording.sensor.si[mask]
-    return float(np.dot(force - force.mean(), values - values.mean()))
+    products = 0.0
+    for recording, one in zip(recordings, usable, strict=True):
+        mask = one & recording.sensor.present
+        if mask.any():
+            force, values = recording.force_n[mask], recording.sensor.si[mask]
+            products += float(np.dot(force - force.mean(), values - values.mean()))
+    return products
 
 
 def reading_in(recording: Recording, unit: Unit) -> Array:

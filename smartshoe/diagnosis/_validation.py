@@ -89,7 +89,7 @@ class LeftOut:
     def _gains(
         self, name: str, start: ExtendedModel, less: ExtendedModel, rows: Callable[[Likelihood], list[Array]]
     ) -> list[Array]:
-        """(recordings or blocks,) gains over ``less``, which lacks the effect: apart, and by thirds where these decide."""
+        """(recordings or blocks,) gains over ``less``, which lacks the effect; by thirds where these decide."""
         gains: list[Array] = []
         for folds, rests in self._ways:
             own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in rests]

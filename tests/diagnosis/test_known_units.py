@@ -302,3 +302,31 @@ def test_what_a_walk_remembers_from_before_it_was_cut_is_no_offset(seed: int) ->
     found = diagnose(cut, case.hold_out)
     assert "zero_offset" not in _named(found)
     assert found.verdict in ("adequate", "explained")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("tau_s", "kept", "named"), [(1.0, 0.1, set()), (3.0, 0.1, set()), (1.0, 0.0, {"linear_leak"})]
+)
+def test_charge_that_fades_is_no_friction(tau_s: float, kept: float, named: set[str], sign: float) -> None:
+    """A reading that fades from each change of the load lies higher while the load rises, as friction does."""
+    runs = []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        presses = [(rng.uniform(0.4, 1.0), rng.uniform(0.5, 3.0), rng.uniform(1.0, 20.0)) for _ in range(6)]
+        load = (
+            _course(
+                (0.0, 2.0),
+                *((x, s) for peak, ramp, hold in presses for x, s in ((peak, ramp), (peak, hold), (0, ramp), (0, 5))),
+            )
+            * 800.0
+        )
+        keep = float(np.exp(-STEP_S / tau_s))
+        faded = lfilter([1.0 - keep], [1.0, -keep], load)
+        runs.append(_run(load, 5.0 + sign * 0.1 * (load - (1.0 - kept) * faded), f"r{seed}", 0.05, seed))
+    found = diagnose(runs[:2], hold_out=runs[2])
+    assert not any("direction" in said for said in found.limits)
+    assert _named(found) - {"zero_offset"} == named
+    assert found.verdict in ("adequate", "explained")
+    assert found.extended is not None
+    assert found.extended.variance_explained_percent > 99.9

@@ -15,13 +15,12 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from smartshoe.diagnosis import Thresholds, _zero
-from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
+from smartshoe.diagnosis._aligned import _on_one_clock
 from smartshoe.diagnosis._held_out import past_of
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, sd_of_a_mean, zeros_of
-from smartshoe.integrity import OneClock
 from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.extended import ExtendedModel
@@ -399,7 +398,7 @@ def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_wa
 def test_what_is_missing_stays_so_where_a_reading_is_moved() -> None:
     run = _run()
     holed = Channel.from_values("pressure", np.where(np.arange(400) == 200, np.nan, run.sensor.values), MILLIBAR)
-    (moved,) = as_they_follow([run.with_channel(replace(holed, role="sensor"))], OneClock(0.52, 0.0))
+    moved, _ = _on_one_clock(run.with_channel(replace(holed, role="sensor")), holed.present, 0.52, 0.0)
     there = moved.sensor.present
     assert moved.sensor.values[there] == pytest.approx(10.0 * (T[there] + 0.52))
     assert list(np.flatnonzero(~there[:380])) == [189, 190]

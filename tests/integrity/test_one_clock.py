@@ -291,10 +291,31 @@ def test_what_is_late_by_a_quarter_of_its_period_is_no_friction(drift: float) ->
         time_s=time_s, force_n=800.0 * load(time_s), pressure_mbar=100.0 * load(time_s - late_s), name="swayed"
     )
     assert "its direction" in str(friction_of(swayed, STANDARD))
-    assert as_they_follow([swayed], None) == [swayed]
-    (moved,) = as_they_follow([swayed], OneClock(0.25, drift))
+    whole = [swayed.sensor.present]
+    assert as_they_follow([swayed], whole, None) == [swayed]
+    (moved,) = as_they_follow([swayed], whole, OneClock(0.25, drift))
     assert friction_of(moved, STANDARD) is None
     assert np.max(np.abs(moved.sensor.values - 100.0 * load(time_s))[100:-100]) < 1.0
+
+
+def test_what_relaxes_through_a_hold_is_not_turned_over_by_what_looks_like_a_lag() -> None:
+    """A ramp of a second, held for thirty, of a wall that gives way: most of the hold the reading falls."""
+    time_s = np.arange(0.0, 33.0, 1.0 / 32.0)
+    load = 20.0 * np.interp(time_s, [0.0, 1.0, 2.0, 32.0, 33.0], [0.0, 0.0, 1.0, 1.0, 0.0])
+    fade = np.exp(-1.0 / 32.0 / 3.0)
+    reading = 20.0 * load - 0.7 * 20.0 * lfilter([1.0 - fade], [1.0, -fade], load)
+    runs = [
+        Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=reading + offset, name=f"held_{offset:g}")
+        for offset in (0.0, 15.0, -90.0)
+    ]
+    whole = [run.sensor.present for run in runs]
+    for lag_s in (8.0, 20.0, 40.0):
+        assert as_they_follow(runs, whole, OneClock(lag_s, 0.0)) == runs
+    found = diagnose(runs[:2], hold_out=runs[2])
+    assert found.baseline_model is not None
+    assert found.baseline_model.full_scale_reading > 0.0
+    assert found.baseline is not None
+    assert found.baseline.variance_explained_percent > 95.0
 
 
 def test_a_walk_shares_the_delay_that_ramps_show() -> None:
