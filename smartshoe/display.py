@@ -85,6 +85,13 @@ def significant(value: float | None, digits: int = 4) -> str:
     return "–" if value is None or value != value else f"{value:.{digits}g}"
 
 
+def percent(share: float, *, signed: bool = False) -> str:
+    """A share in percent to two digits, of a hundred and more to the last before the decimal point."""
+    value = 100.0 * share
+    sign = "+" if signed else ""
+    return f"{value:{sign}.0f} %" if abs(value) >= 99.5 else f"{value:{sign}.2g} %"
+
+
 def sure(probability: float) -> str:
     """A probability as a person takes it; never a hundred percent."""
     if not math.isfinite(probability):

@@ -14,6 +14,7 @@ from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._zero import mean_offset
+from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import in_words, listed
 from smartshoe.models.extended import ExtendedModel
@@ -128,9 +129,7 @@ def clipped_of(found: Compensation) -> list[str]:
     """What is said of samples of which no force is asked."""
     if not found.clipped:
         return []
-    return [
-        f"errors of the force leave out {100.0 * found.clipped:.2g} % of samples, which are clipped and tell no load"
-    ]
+    return [f"errors of the force leave out {percent(found.clipped)} of samples, which are clipped and tell no load"]
 
 
 def force_of(found: Compensation) -> list[str]:
@@ -175,7 +174,7 @@ def late_of(found: Compensation) -> list[str]:
 def going_on_of(found: Compensation, named: Collection[str], thresholds: Thresholds) -> list[str]:
     """What is said of effects that are not ``named`` and that a calibration takes off by the clock, on and on."""
     said = [
-        f"{in_words(name)} by {100.0 * share:+.2g} %"
+        f"{in_words(name)} by {percent(share, signed=True)}"
         for name, share in found.filter.moved_in_an_hour.items()
         if name not in named and abs(share) > thresholds.standing
     ]

@@ -19,6 +19,7 @@ from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import OwnZeros, Zero
+from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect, in_words, listed
@@ -197,7 +198,7 @@ def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
         "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
         " changed, or the model follows the fitted ones for a wrong reason"
     )
-    return f"held-out recordings are off by {100 * off:.2g} % of full scale, fitted ones by {100 * within:.2g} %: {why}"
+    return f"held-out recordings are off by {percent(off)} of full scale, fitted ones by {percent(within)}: {why}"
 
 
 def past_of(zero: Zero, scale: Scale) -> str:
@@ -215,7 +216,7 @@ def led_back_of(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
     Of a unit that is unloaded in the recordings, though never as they begin, nothing but its past is unknown.
     """
     stands = (
-        f"the reading stands at {zero.value * scale.reading:.3g} {scale.unit.symbol} ({100 * zero.size:.2g} % of full"
+        f"the reading stands at {zero.value * scale.reading:.3g} {scale.unit.symbol} ({percent(zero.size)} of full"
         " scale): an offset, a tare, or what the unit"
     )
     if zero.led_from <= thresholds.standing:
@@ -224,7 +225,7 @@ def led_back_of(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
             " a rest before the first load)"
         )
     return (
-        f"led back to no load from {100 * zero.led_from:.2g} % of it, {stands} does below such loads, or remembers of"
+        f"led back to no load from {percent(zero.led_from)} of it, {stands} does below such loads, or remembers of"
         " those before, of which this data shows nothing (record a rest without load that the sensor can read)"
     )
 
@@ -251,8 +252,8 @@ def crept_of(drift: Name, tare: Zero | None) -> str | None:
     if tare is None:
         return None
     return (
-        f"{in_words(drift.effect.name)} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
-        f" which a tare of {100 * tare.size:.2g} % may do by creeping, so that it is not named (zero the load cell, and"
+        f"{in_words(drift.effect.name)} moves the reading by {percent(drift.member.size)} of full scale,"
+        f" which a tare of {percent(tare.size)} may do by creeping, so that it is not named (zero the load cell, and"
         " log a rest)"
     )
 
@@ -266,9 +267,9 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
         return [f"the gain changes {_when(changes)}, as where a unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
     return [
-        f"each recording has a gain of its own, from {100 * low.share:+.2g} % in {low.recording} to"
-        f" {100 * high.share:+.2g} % in {high.recording} beside that of all, as where a unit is taken out and put back:"
-        f" {told} (leave the unit in place, or calibrate it each time)"
+        f"each recording has a gain of its own, from {percent(low.share, signed=True)} in {low.recording} to"
+        f" {percent(high.share, signed=True)} in {high.recording} beside that of all, as where a unit is taken out and"
+        f" put back: {told} (leave the unit in place, or calibrate it each time)"
     ]
 
 
@@ -280,7 +281,7 @@ def own_zeros_of(zeros: OwnZeros | None, scale: Scale) -> list[str]:
 
     def told(at: int) -> str:
         share = float(zeros.offsets[at])
-        of_scale = f"{100 * share:+.2g} % of full scale"
+        of_scale = f"{percent(share, signed=True)} of full scale"
         return f"{scale.zero + share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
 
     return [
@@ -302,7 +303,7 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
 
 
 def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
-    few = [f"by {100 * one.share:+.2g} % {time_of(one)} in {one.recording}" for one in changes[:SAID]]
+    few = [f"by {percent(one.share, signed=True)} {time_of(one)} in {one.recording}" for one in changes[:SAID]]
     return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 
 
@@ -312,10 +313,10 @@ def nearest_of(found: Inference, thresholds: Thresholds) -> list[str]:
         return []
     effect, left, beside = found.nearest
     return [
-        f"{in_words(effect.name)} alone follows most of what the baseline misses ({100 * left:.2g} % of full scale"
-        f" where it was fitted, {100 * beside:.2g} % with it), and so may small imperfections of many kinds,"
-        f" {100 * thresholds.imperfection:.2g} % each, so that it is not named: if this unit is better than that, ask"
-        f" for less than {100 * thresholds.material:.2g} % as material"
+        f"{in_words(effect.name)} alone follows most of what the baseline misses ({percent(left)} of full scale"
+        f" where it was fitted, {percent(beside)} with it), and so may small imperfections of many kinds,"
+        f" {percent(thresholds.imperfection)} each, so that it is not named: if this unit is better than that, ask"
+        f" for less than {percent(thresholds.material)} as material"
     ]
 
 

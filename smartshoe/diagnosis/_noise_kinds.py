@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._session import Session
+from smartshoe.display import percent
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import NoiseEffect, catalogue
 from smartshoe.models.extended import ExtendedModel
@@ -48,7 +49,7 @@ def noise_kinds(
     if memory is not None and memory.is_noise and memory.rms >= material:
         says = (
             f"what is left is correlated over about {memory.tau_s:.2g} s, under any load alike: coloured noise of"
-            f" {100 * memory.rms:.2g} % of full scale"
+            f" {percent(memory.rms)} of full scale"
         )
         found += [
             _throughout(session, remembering, says)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
-from smartshoe.display import moment
+from smartshoe.display import moment, percent
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 from smartshoe.signals.masks import runs_of
@@ -63,6 +63,6 @@ def too_slow_of(recording: Recording, usable: Mask, longest_s: float, thresholds
     apart_s = float(np.median(np.diff(time_s[within]))) if within.sum() > 1 else longest_s
     return (
         f"{recording.label}: from {moment(float(at_s[first]))} to {moment(float(at_s[last - 1]))} s"
-        f" {100 * float(slow.mean()):.2g} % of it is not used: samples are {apart_s:.3g} s apart there, and fits that"
+        f" {percent(float(slow.mean()))} of it is not used: samples are {apart_s:.3g} s apart there, and fits that"
         f" follow its load need one in {longest_s:.3g} s (log at one rate, or give that stretch as a file of its own)"
     )

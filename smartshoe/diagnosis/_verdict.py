@@ -14,6 +14,7 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_no
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.display import percent
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import listed
@@ -121,12 +122,12 @@ def not_explained_of(rest: ResidualStructure, elsewhere: float, unproven: float,
     ``elsewhere`` is that of `off_elsewhere`, ``unproven`` of `not_shown_to_be_noise`.
     """
     if unproven > max(rest.rms, elsewhere):
-        return f"{100 * unproven:.2g} % is left, of which nothing shows that it is noise"
+        return f"{percent(unproven)} is left, of which nothing shows that it is noise"
     if elsewhere > rest.rms:
-        return f"of held-out data {100 * elsewhere:.2g} % is not explained"
+        return f"of held-out data {percent(elsewhere)} is not explained"
     if rest.rms <= thresholds.material:
         return None
-    return f"over all recordings {100 * rest.rms:.2g} % {rest.how} and is not explained"
+    return f"over all recordings {percent(rest.rms)} {rest.how} and is not explained"
 
 
 def sentence_of(
@@ -145,11 +146,11 @@ def sentence_of(
     ``named``: what is in the extended model, as `names_in` says it. ``not_explained``: that of `not_explained_of`.
     ``withheld``: its limits say why no cause may be named.
     """
-    good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
+    good = f"the baseline simulation is good to {percent(baseline.rmse)} of full scale on data it was not fitted to"
     if baseline.is_empty:
         good = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
     left = "" if not_explained is None else f"; {not_explained}"
-    by_all = f"{100 * best.rmse:.2g} %"
+    by_all = f"{percent(best.rmse)}"
     if verdict == "adequate":
         return f"{good}{left}"
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:

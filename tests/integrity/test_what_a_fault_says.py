@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import diagnose
-from smartshoe.display import moment
+from smartshoe.display import moment, percent
 from smartshoe.integrity import examine
 from smartshoe.integrity._sampling import short_recording
 from smartshoe.integrity.thresholds import Thresholds
@@ -177,3 +177,16 @@ def test_a_time_is_told_to_its_digits_however_many_are_noughts(at_s: float, digi
         assert float(told) == pytest.approx(exact_s, rel=0.5 * 10.0 ** (1 - digits))
         assert "e" not in told or exact_s < 1e-3
     assert moment(3600.0, digits) == "3600"
+
+
+@given(share=st.floats(-1e3, 1e3), signed=st.booleans())
+def test_a_share_is_told_in_percent_without_a_power_of_ten(share: float, signed: bool) -> None:
+    said = percent(share, signed=signed).removesuffix(" %")
+    assert "e+" not in said
+    assert float(said) == pytest.approx(100.0 * share, rel=0.05)
+
+
+def test_shares_in_percent_by_hand() -> None:
+    assert percent(0.5, signed=True) == "+50 %"
+    assert percent(1.3) == "130 %"
+    assert percent(0.00012) == "0.012 %"
