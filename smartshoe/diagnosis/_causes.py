@@ -9,7 +9,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._members import Alternative
-from smartshoe.diagnosis._naming import Name, confidence_of, doubted
+from smartshoe.diagnosis._naming import Name, confidence_of
 from smartshoe.diagnosis._parameters import in_unit, parameters_of
 from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Cause, Rival, Statement
 from smartshoe.diagnosis._scale import Scale
@@ -34,14 +34,12 @@ def cause_of(
     member = name.member
     law = name.by or next((a for a in member.laws if a.effect == name.effect.name), None)
     won = gain(errors(fine, member.without.model), best, scale, thresholds)
-    if won.is_loss:
-        name = doubted(name)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
         _without_it(name),
         *_held_out_evidence(member.size, won, thresholds.material),
         *_against(rivals, name.equivalents),
-        *_how_sure(name, found, thresholds, is_loss=won.is_loss),
+        *_how_sure(name, found, thresholds),
         *_missed_by(law, name, thresholds),
         *_not_shown(name, excitation),
     )
@@ -82,11 +80,8 @@ def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[S
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 
-def _how_sure(name: Name, found: Inference, thresholds: Thresholds, *, is_loss: bool) -> list[Statement]:
+def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Statement]:
     """Why it is named though it is not sure, or though no law of its kind follows it."""
-    if is_loss:
-        says = "it is not sure, since data that was not fitted is foreseen worse with it, for certain"
-        return [Statement(OF_A_DOUBTED_CAUSE, name.kind_probability, thresholds.least_confidence, says)]
     if not name.is_sure:
         does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
         why = (

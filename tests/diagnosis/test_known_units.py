@@ -330,19 +330,3 @@ def test_charge_that_fades_is_no_friction(tau_s: float, kept: float, named: set[
     assert found.verdict in ("adequate", "explained")
     assert found.extended is not None
     assert found.extended.variance_explained_percent > 99.9
-
-
-@pytest.mark.parametrize("drifts_there", [True, False])
-def test_what_is_foreseen_worse_for_certain_is_half_sure_at_most(drifts_there: bool) -> None:
-    """A gain that falls in what is fitted, and does so in what is held out or not."""
-
-    def run(load: Array, name: str, seed: int, per_s: float) -> Recording:
-        return _run(load, 2.0 * _solid(load, 1.0) * (1.0 - per_s * _times(load)), name, 0.02, seed)
-
-    fitted = [run(TRIANGLES_N, "a", 1, 2e-4), run(HOLDS_N, "b", 2, 2e-4)]
-    found = diagnose(fitted, hold_out=run(HOLDS_N, "c", 3, 2e-4 if drifts_there else 0.0))
-    (drift,) = (cause for cause in found.causes if cause.name == "gain_drift")
-    assert drift.held_out is not None
-    assert (drift.held_out.gain_percent > 0.0) is drifts_there
-    assert (drift.confidence > 0.5) is drifts_there
-    assert any("for certain" in one.says for one in drift.evidence) is not drifts_there
