@@ -56,6 +56,8 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("N", "n", "force", 1.0, 0.0, ("newton", "newtons", "牛", "牛顿")),
     ("kN", "kn", "force", 1e3, 0.0, ("kilonewton", "千牛")),
     ("mN", "millinewton", "force", 1e-3, 0.0, ()),
+    ("uN", "micronewton", "force", 1e-6, 0.0, ("µN",)),
+    ("nN", "nanonewton", "force", 1e-9, 0.0, ()),
     ("MN", "meganewton", "force", 1e6, 0.0, ()),
     ("daN", "dan", "force", 10.0, 0.0, ()),
     ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # of a load cell that reads mass

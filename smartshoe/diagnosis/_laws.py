@@ -10,7 +10,7 @@ from smartshoe.diagnosis._members import Alternative, Member, fit_with
 from smartshoe.diagnosis._search import SWAPS
 from smartshoe.diagnosis._sensitivity import Candidate, available
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
-from smartshoe.models.effects import Effect, blocks, catalogue
+from smartshoe.models.effects import Effect, blocks
 from smartshoe.models.extended import ExtendedModel
 
 
@@ -62,7 +62,7 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
         if one.departed > 1.0 or one.is_ended or other.margin < 0.0:
             # What departs by more than equations do, or lies where its kind ends, may be of another kind; or where that
             # is the likelier, and was taken out beside this one.
-            law = catalogue()[str(other.effect)]
+            law = next(c.effect for c in evidence.given.candidates if c.name == other.effect)
             tried.append(fit_with(law, one.without.model, found.likelihood, (other.shape or {},)))
     if not tried:
         return

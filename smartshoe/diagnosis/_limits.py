@@ -23,10 +23,13 @@ from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect, in_words, listed
+from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import Unit
 
 ONE_CYCLE = "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
+NO_PRESSURES = frozenset({"force", "length", "resistance", "capacitance", "angle"})  # as a voltage or counts may be
 SAID = 4  # of many of a kind, as changes of a gain, that are told one by one
 
 
@@ -101,6 +104,17 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
     return f"{said}; it needs {ways or 'more load cycles'}"
 
 
+def of_no_gas(name: Name, unit: Unit) -> str | None:
+    """What is said of what a gas remembers, where the reading is none of a gas's pressure."""
+    if unit.quantity not in NO_PRESSURES or name.effect.stage != "gas" or not isinstance(name.effect, CoreEffect):
+        return None
+    return _unnamed(
+        name,
+        f"a reading in {unit.symbol} is no gas's pressure: something gives way in holds, or comes back, as no law of"
+        " the catalogue does",
+    )
+
+
 def moved_of(name: Name) -> str:
     """What is said of a latency that is left where readings were moved to the load's clock before."""
     return _unnamed(
@@ -158,7 +172,8 @@ def bent_to_the_end_of(model: ExtendedModel) -> str | None:
 
 def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
     """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
-    if model.wall_ratio != USUAL_WALL_RATIO:  # one is known
+    is_of_gas = any(part.effect.stage == "gas" for part in model.parts)
+    if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # one is known
         return None
     softest, stiffest = PAPER_WALL_RATIOS
     gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]

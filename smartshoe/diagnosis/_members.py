@@ -151,11 +151,10 @@ def _other_laws(
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
     likelihood, of_curves = less.likelihood, _is_any_curve(one.effect, is_ended)
-    channels = {e.name for e in available(likelihood.sessions, likelihood.thresholds)}
     beside, found = _without(one.name, extended.model), []
-    for law in catalogue().values():
+    for law in available(likelihood.sessions, likelihood.thresholds):
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
-        if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
+        if law.is_flexible or not is_other or law.name in (one.name, *less.model.names):
             continue
         fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:RIVALS], beside)
         is_bent = is_beyond_memory(fitted.model, likelihood.thresholds) and not is_stretched(extended.model)

@@ -74,12 +74,15 @@ def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effec
     """Physical effects and flexible blocks whose channels were logged throughout.
 
     Not those that shift load or reading by one value, which no waveform tells from a recording's own offset
-    (`smartshoe.diagnosis._zero`); nor those that only later load cycles show, where no recording has any.
+    (`smartshoe.diagnosis._zero`); nor those that only later load cycles show, where no recording has any. Of a pressure
+    that falls in holds the gas is the cause; of other readings the sensor may be, too.
     """
     has = logged_channels(sessions)
     has_cycles = have_later_cycles(sessions, thresholds)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
+    if not any(one.recording.sensor.unit.quantity == "pressure" for one in sessions):
+        found = [e.of_any_sensor() for e in found]
     return [e for e in found if e.needs <= has and not e.is_refinement and (has_cycles or not e.needs_cycles)]
 
 

@@ -14,6 +14,7 @@ from smartshoe.diagnosis._limits import (
     led_back_of,
     moved_of,
     not_shown_of,
+    of_no_gas,
     other_kind_of,
     parted_clocks,
     past_of,
@@ -95,7 +96,11 @@ def _shown(found: Inference, given: Prepared, left: float) -> Chosen:
             undone = [one for one in found.members if one.name in found.undone and one.effect.kind == found.alone.kind]
             likely = names_of(undone, left, thresholds, is_unsteady=True, alone=found.alone)
         shown = Chosen(likely, (), limits).without(
-            lambda one: other_kind_of(one, found.fit.model, thresholds) or not_shown_of(one, given.excitation)
+            lambda one: (
+                other_kind_of(one, found.fit.model, thresholds)
+                or not_shown_of(one, given.excitation)
+                or of_no_gas(one, given.scale.unit)
+            )
         )
         withheld = [one.member for one in likely if one not in shown.names]
         limits, nameless = shown.limits, max([nameless, *(one.size for one in withheld)])

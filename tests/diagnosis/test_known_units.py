@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from simulators.hidden.recordings import HiddenCase, hide
-from smartshoe import Recording, diagnose
+from smartshoe import Recording, compensate, diagnose
 from smartshoe.diagnosis import Diagnosis
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
+from smartshoe.recording import Channel
+from smartshoe.units import unit
 
 Array = NDArray[np.float64]
 
@@ -330,3 +334,53 @@ def test_charge_that_fades_is_no_friction(tau_s: float, kept: float, named: set[
     assert found.verdict in ("adequate", "explained")
     assert found.extended is not None
     assert found.extended.variance_explained_percent > 99.9
+
+
+def _stairs(seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    presses = zip(rng.uniform(0.25, 1.0, 7), rng.uniform(0.5, 3.0, 7), rng.uniform(1.0, 40.0, 7), strict=True)
+    steps = [((peak, ramp), (peak, hold), (0.0, ramp), (0.0, 15.0)) for peak, ramp, hold in presses]
+    return _course((0.0, 3.0), *(step for press in steps for step in press), peak_n=PEAK_N)
+
+
+def _giving_way(seed: int, spectrum: dict[float, float], bow: float = 0.0) -> Recording:
+    """Of a polymer that is stretched, or a foil that is pressed, in ohms, which fall through a hold."""
+    load = _stairs(seed)
+    share = load / PEAK_N
+    bent = share + bow * share * (1.0 - share)
+    fading = [(part, float(np.exp(-STEP_S / tau))) for tau, part in spectrum.items()]
+    given_way = sum(part * lfilter([1.0 - keep], [1.0, -keep], bent) for part, keep in fading)
+    reading = 80.0 * (bent - given_way) + 5.0 + 0.05 * np.random.default_rng(seed).standard_normal(load.size)
+    foil = Channel.from_values("foil", reading, unit("ohm"), "sensor")
+    return Recording.from_arrays(time_s=_times(load), force_n=load, name=f"r{seed}").with_channel(foil)
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "bow", "named"),
+    [
+        ({1.0: 0.2, 20.0: 0.15}, 0.0, {"second_relaxation"}),
+        ({1.0: 0.2, 20.0: 0.05}, 0.0, {"second_relaxation"}),
+        ({2.0: 0.3, 60.0: 0.2}, 0.3, {"second_relaxation", "static_curve"}),
+    ],
+)
+def test_what_gives_way_in_holds_is_a_relaxation_where_the_reading_is_no_pressure(
+    spectrum: dict[float, float], bow: float, named: set[str], tmp_path: Path
+) -> None:
+    runs = [_giving_way(seed, spectrum, bow) for seed in range(3)]
+    found = diagnose(runs[:2], hold_out=runs[2])
+    assert {c.effect.family if c.effect.family == "static_curve" else c.name for c in found.causes} == named
+    assert found.verdict == "explained"
+    relaxing = next(cause for cause in found.causes if cause.effect.family == "relaxation")
+    assert relaxing.parameters["share"].value < 0.0
+    assert found.extended is not None
+    assert found.extended.variance_explained_percent > 99.98
+    found.calibration(unit="foil").save(tmp_path / "foil.json")
+    force = compensate(runs[2], tmp_path / "foil.json")
+    assert float(np.sqrt(np.mean((force - runs[2].force_n) ** 2))) < 0.01 * PEAK_N
+
+
+def test_a_resistance_that_gives_way_over_many_times_is_none_of_a_gas() -> None:
+    runs = [_giving_way(seed, {0.3: 0.1, 3.0: 0.1, 30.0: 0.1, 300.0: 0.1}) for seed in range(3)]
+    found = diagnose(runs[:2], hold_out=runs[2])
+    assert {cause.effect.family for cause in found.causes} == {"relaxation"}
+    assert any("no gas's pressure" in said for said in found.limits)

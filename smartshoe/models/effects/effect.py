@@ -258,6 +258,10 @@ class Effect(ABC):
         """Whether it goes with time, or with what was borne so far, by what its neighbours are told from it."""
         return any(words & CLOCK for words in self.separated_by.values())
 
+    def of_any_sensor(self) -> Effect:
+        """The same of a reading that is no pressure: stress, and what a polymer conducts, may give way in holds."""
+        return self
+
     def departs_by(self, values: Array) -> float:
         """Of a block that follows what no law does: by what share of itself it differs from a law."""
         return 1.0

@@ -7,19 +7,15 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
-from smartshoe.models.elements import Arm, Element, Heat
+from smartshoe.models.elements import Element, relaxing
 
 RATES_PER_S = np.geomspace(0.01, 30.0, 6)
-GAS_SHARE = 1.6 / 0.6  # heat's share for one of the reading: N/(N - 1) at the usual wall ratio N of the core
 
 
 class FlexibleRelaxation(CoreEffect):
     """At each of six fixed rates a Maxwell arm where the weight is positive, heat of compression where it is negative.
 
-    To first order the reading is p (1 - sum of w s/(s + rate)), of either sign. An arm of negative stiffness would say
-    the same, but such a network oscillates or runs away beside the baseline's own arm; arms and heats are springs and
-    dampers, so that poles and zeros stay real and negative for any weights. At a wall ratio other than the usual one
-    the two signs differ in size.
+    To first order the reading is p (1 - sum of w s/(s + rate)), of either sign (`relaxing`).
     """
 
     name, family, stage = "flexible_relaxation", "relaxation", "wall"
@@ -37,7 +33,4 @@ class FlexibleRelaxation(CoreEffect):
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """Six arms or heats."""
-        return tuple(
-            Arm(float(share), float(rate)) if share >= 0.0 else Heat(-GAS_SHARE * float(share), float(rate))
-            for share, rate in zip(values, RATES_PER_S, strict=True)
-        )
+        return tuple(relaxing(float(share), float(rate)) for share, rate in zip(values, RATES_PER_S, strict=True))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
-from smartshoe.models.elements import Arm, Element
+from smartshoe.models.elements import Element, relaxing
 
 SHORTEST_S, LONGEST_S, ARMS = 0.02, 2000.0, 9
 SPACING = math.log10(LONGEST_S / SHORTEST_S) / (ARMS - 1)  # decades
@@ -43,8 +44,29 @@ class PowerLawCreep(CoreEffect):
         "second_relaxation": by("steps", "long_hold"),
     }
 
+    def of_any_sensor(self) -> PowerLawCreep:
+        """What is held may creep up or give way."""
+        return _EITHER_WAY
+
     def elements(self, values: Array) -> tuple[Element, ...]:
         """The ladder's arms."""
         creep, exponent = (float(value) for value in values)
         times = [SHORTEST_S * 10.0 ** (SPACING * k) for k in range(ARMS)]
-        return tuple(Arm(creep * SPACING * tau**-exponent, 1.0 / tau) for tau in times)
+        return tuple(relaxing(creep * SPACING * tau**-exponent, 1.0 / tau) for tau in times)
+
+
+class _EitherWay(PowerLawCreep):
+    """The same of either sign."""
+
+    says = "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time"
+    parameters = (
+        replace(
+            PowerLawCreep.parameters[0],
+            says="relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds",
+            lower=-2.0,
+        ),
+        PowerLawCreep.parameters[1],
+    )
+
+
+_EITHER_WAY = _EitherWay()

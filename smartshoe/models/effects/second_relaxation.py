@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
-from smartshoe.models.elements import Arm, Element
+from smartshoe.models.elements import Element, relaxing
 
 
 class SecondRelaxation(CoreEffect):
@@ -28,6 +30,27 @@ class SecondRelaxation(CoreEffect):
         "sensor_lag": by("steps"),
     }
 
+    def of_any_sensor(self) -> SecondRelaxation:
+        """What is held may creep up or give way."""
+        return _EITHER_WAY
+
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One arm."""
-        return (Arm(float(values[0]), 1.0 / float(values[1])),)
+        return (relaxing(float(values[0]), 1.0 / float(values[1])),)
+
+
+class _EitherWay(SecondRelaxation):
+    """The same of either sign."""
+
+    says = "the sensor relaxes with a second time constant: the reading goes on in holds, and back in rests"
+    parameters = (
+        replace(
+            SecondRelaxation.parameters[0],
+            says="what relaxes by the second time constant, over what does not; < 0: the reading falls in holds",
+            lower=-2.0,
+        ),
+        SecondRelaxation.parameters[1],
+    )
+
+
+_EITHER_WAY = _EitherWay()
