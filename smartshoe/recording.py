@@ -7,7 +7,7 @@ nothing; a computation asks for SI by name (``recording.force_n``, ``channel.si`
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -112,6 +112,19 @@ def _role_of(name: str, unit_: Unit) -> Role:
     return "auxiliary"
 
 
+def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> int | None:
+    """The auxiliary channel that is the only one beside a load, if it states a unit of what a sensor gives.
+
+    Not one of a crosshead or of the room.
+    """
+    left = [index for index, role in enumerate(roles) if role != "load"]
+    if len(roles) != 2 or len(left) != 1 or roles[left[0]] != "auxiliary":
+        return None
+    unit_ = units[left[0]]
+    is_sensors = unit_ is not None and unit_.quantity not in ("length", "temperature", "force", "time")
+    return left[0] if is_sensors else None
+
+
 def split_column(column: str) -> tuple[str, Unit | None]:
     """A plain table's column ``name_unit`` as its name and unit (None where the ending is no unit)."""
     for cut in range(len(column)):  # the longest ending that is a unit: force_n_per_s before force_n_per + s
@@ -184,7 +197,8 @@ class Recording(Summarised):
     ) -> Self:
         """A recording from arrays named as a plain table's columns: ``force_n=``, ``pressure_mbar=``, ...
 
-        NaN marks a missing sample. Raises `UnitError` for a name without a unit, `InputError` for what is no number,
+        A single column beside the load is the reading if its unit is one that sensors give (``cell_v=``). NaN marks a
+        missing sample. Raises `UnitError` for a name without a unit, `InputError` for what is no number,
         shapes that differ or time that does not increase.
         """
         channels: dict[str, Channel] = {}
@@ -198,6 +212,10 @@ class Recording(Summarised):
                 key: replace(one, role="auxiliary") if one.role == "sensor" and key != SENSOR_NAME else one
                 for key, one in channels.items()
             }
+        keys = list(channels)
+        only = only_reading([one.role for one in channels.values()], [one.unit for one in channels.values()])
+        if only is not None:
+            channels[keys[only]] = replace(channels[keys[only]], role="sensor")
         return cls(numbers_of(time_s, f"{name}: time_s"), channels, name, unit, dict(metadata or {}))
 
     def __reduce__(self) -> tuple[Any, ...]:

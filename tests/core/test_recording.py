@@ -152,3 +152,20 @@ def test_sample_rate_is_that_of_the_grid(count: int, step: float) -> None:
     recording = Recording.from_arrays(time_s=np.arange(count) * step, force_n=np.zeros(count))
     assert recording.sample_rate_hz == pytest.approx(1.0 / step, rel=1e-9)
     assert recording.is_uniform
+
+
+@pytest.mark.parametrize(
+    ("columns", "role"),
+    [
+        ({"foil_ohm": [1.0, 2.0]}, "sensor"),
+        ({"cell_v": [1.0, 2.0]}, "sensor"),
+        ({"adc_counts": [1.0, 2.0]}, "sensor"),
+        ({"crosshead_mm": [1.0, 2.0]}, "auxiliary"),
+        ({"room_c": [1.0, 2.0]}, "auxiliary"),
+        ({"foil_ohm": [1.0, 2.0], "cell_v": [1.0, 2.0]}, "auxiliary"),
+        ({"pressure_mbar": [1.0, 2.0], "foil_ohm": [1.0, 2.0]}, "auxiliary"),
+    ],
+)
+def test_a_single_array_beside_the_load_is_the_reading_as_in_a_file(columns: dict[str, list[float]], role: str) -> None:
+    recording = Recording.from_arrays(time_s=[0.0, 1.0], force_n=[0.0, 1.0], **columns)
+    assert recording.channels[split_column(list(columns)[-1])[0]].role == role

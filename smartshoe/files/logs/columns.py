@@ -22,6 +22,7 @@ from smartshoe.recording import (
     Channel,
     Recording,
     Role,
+    only_reading,
 )
 from smartshoe.units import Unit, declared, on_one_cm2
 
@@ -60,19 +61,6 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
             if unit_ is not None and unit_.quantity == "pressure" and roles[index] == "auxiliary":
                 roles[index] = "sensor"
     return roles
-
-
-def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> int | None:
-    """The auxiliary channel that is the only one beside a load, if it states a unit of what a sensor gives.
-
-    Not one of a crosshead or of the room.
-    """
-    left = [index for index, role in enumerate(roles) if role != "load"]
-    if len(roles) != 2 or len(left) != 1 or roles[left[0]] != "auxiliary":
-        return None
-    unit_ = units[left[0]]
-    is_sensors = unit_ is not None and unit_.quantity not in ("length", "temperature", "force", "time")
-    return left[0] if is_sensors else None
 
 
 def _rename(
@@ -303,4 +291,4 @@ def recording_from(
     )
 
 
-__all__ = ["is_negative", "only_reading", "recording_from", "roles_of"]
+__all__ = ["is_negative", "recording_from", "roles_of"]

@@ -55,7 +55,7 @@ class PowerLawCreep(CoreEffect):
         return tuple(relaxing(creep * SPACING * tau**-exponent, 1.0 / tau) for tau in times)
 
 
-class _EitherWay(PowerLawCreep):
+class _CreepingEitherWay(PowerLawCreep):
     """The same of either sign."""
 
     says = "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time"
@@ -69,4 +69,4 @@ class _EitherWay(PowerLawCreep):
     )
 
 
-_EITHER_WAY = _EitherWay()
+_EITHER_WAY = _CreepingEitherWay()

@@ -39,7 +39,7 @@ class SecondRelaxation(CoreEffect):
         return (relaxing(float(values[0]), 1.0 / float(values[1])),)
 
 
-class _EitherWay(SecondRelaxation):
+class _RelaxingEitherWay(SecondRelaxation):
     """The same of either sign."""
 
     says = "the sensor relaxes with a second time constant: the reading goes on in holds, and back in rests"
@@ -53,4 +53,4 @@ class _EitherWay(SecondRelaxation):
     )
 
 
-_EITHER_WAY = _EitherWay()
+_EITHER_WAY = _RelaxingEitherWay()

@@ -19,8 +19,8 @@ from smartshoe.files.logs._moments import is_moment
 from smartshoe.files.logs._numbers import is_missing, numbers_of
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import head_lines, is_text, plain_title, read_lines
-from smartshoe.files.logs.columns import only_reading, roles_of
-from smartshoe.recording import Channel, Recording, Role, column_name, split_column
+from smartshoe.files.logs.columns import roles_of
+from smartshoe.recording import Channel, Recording, Role, column_name, only_reading, split_column
 from smartshoe.units import declared, find_unit
 
 _KEY_VALUE = re.compile(r'#\s*("(?:[^"\\]|\\.)*"|[^:]*?)\s*:\s*(.*?)\s*')
