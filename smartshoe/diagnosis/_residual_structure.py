@@ -57,8 +57,11 @@ class ResidualStructure:
 
     @property
     def is_tested(self) -> bool:
-        """Whether a test would have shown all that is beyond white noise: else finding none says nothing."""
-        return self.memory is not None or any(one.would_show(self.size) for one in (self.repeating, self.slow))
+        """Whether a test would have shown all that is beyond white noise: else finding none says nothing.
+
+        What does not repeat may be structure even so: that it repeats not is no such test.
+        """
+        return self.memory is not None or self.slow.would_show(self.size)
 
     @property
     def _found(self) -> list[float]:

@@ -288,7 +288,8 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     monkeypatch.setattr(_laws, "evidence_about", about)
     monkeypatch.setattr(_laws, "fit_with", with_law)
     found: Any = SimpleNamespace(model=SimpleNamespace(names=("delay", "leak")), likelihood=None)
-    evidence: Any = SimpleNamespace(thresholds=STANDARD, odds=10.0)
+    laws = [SimpleNamespace(name=name, effect=law) for name, law in catalogue().items()]
+    evidence: Any = SimpleNamespace(thresholds=STANDARD, odds=10.0, given=SimpleNamespace(candidates=laws))
 
     def told(*members: Any) -> list[str]:
         asked.clear()

@@ -52,10 +52,11 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
     rng = np.random.default_rng([seed, 9])
     usable = rng.random(load.size) >= lost
     held_out = np.zeros(load.size, dtype=bool) if held is None else held
+    told = SimpleNamespace(metadata={}, sensor=SimpleNamespace(unit=MILLIBAR))
     return SimpleNamespace(
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
-        cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}), unknown_past=0.05,
+        cycle=np.arange(load.size) * 7 // load.size, recording=told, unknown_past=0.05,
         own_gain_sd=0.0, gain_parts=(), zero_changes=(), zero_sd=0.0, gap_ends=(), thinned=1, resting=load <= 0.0,
     )  # fmt: skip
 

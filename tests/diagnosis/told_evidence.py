@@ -13,6 +13,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis._session import Quiet, Session
 from smartshoe.models.effects import Conditions
+from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
 
@@ -67,7 +68,7 @@ def worth(*worths: float) -> Callable[[tuple[int, ...]], float]:
 def session_of(load: Array, fitted: Any = None, cycle: Any = None, reading: Any = None) -> Any:
     kept = np.ones(load.size, dtype=bool) if fitted is None else fitted
     at = Conditions(0.1 * np.arange(load.size), load, 0.1)
-    told: Any = SimpleNamespace(metadata={})
+    told: Any = SimpleNamespace(metadata={}, sensor=SimpleNamespace(unit=MILLIBAR))
     return Session(
         told, 0, at, load.copy() if reading is None else reading, np.ones(load.size, dtype=bool), ~kept,
         np.zeros(load.size, dtype=np.intp) if cycle is None else cycle, load < 0.02, 1, Quiet(load, 0.0, 0.0),

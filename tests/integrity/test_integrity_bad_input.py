@@ -50,8 +50,10 @@ def test_a_load_that_is_taken_as_the_sensor_is_told_as_such(tmp_path: Path) -> N
 def test_what_is_asked_for_is_chosen_from_the_columns_that_are_there() -> None:
     loadless = _recording(pressure_mbar=READING, left_mv=LOAD_N, right_mv=LOAD_N)
     assert examine([loadless]).refusals[0].endswith("name its column with --force (columns: left, right)")
-    with pytest.raises(MissingChannelError, match=r"--sensor, for example --sensor 'left' \(columns: left, force\)"):
-        _ = replace(_recording(left_mv=READING, force_n=LOAD_N), source="log.csv").sensor
+    with pytest.raises(
+        MissingChannelError, match=r"--sensor, for example --sensor 'left' \(columns: left, right, force\)"
+    ):
+        _ = replace(_recording(left_mv=READING, right_mv=READING, force_n=LOAD_N), source="log.csv").sensor
     both = examine([_recording(force_n=LOAD_N, left_toe_mbar=READING, left_heel_mbar=READING)])
     assert both.refusals[0].endswith("there are 2 readings (left_toe, left_heel): name one with --sensor")
 
