@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.integrity._answers import answered_s
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
 from smartshoe.integrity._view import View
@@ -28,6 +29,8 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         follows = view.thresholds.follows
         if view.thresholds.clear * (1.0 - share) <= view.thresholds.same or (share >= follows and moves_with > 0.0):
             return  # of a few samples a ramp, a load looks like noise: what is followed is none
+        if share >= follows and _answers(view):
+            return
         if (stands_still := frozen(view)) is not None:
             yield stands_still
             return
@@ -69,6 +72,19 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
 def _is_noise(view: View) -> bool:
     """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp."""
     return view.load_span <= 2.0 * view.load.largest * view.load.quiet_noise
+
+
+def _answers(view: View) -> bool:
+    """Whether what the load does anew is answered, and soon: a unit that lags by longer than its load stays.
+
+    Its reading is anywhere at any load, and moves against it as often as with it.
+    """
+    for time_constant_s in view.thresholds.memory_s:
+        width_s = max(view.step_s, time_constant_s / view.thresholds.few)
+        late_s = answered_s(view.time_s, view.load.values, view.reading.values, width_s, view.thresholds)
+        if late_s is not None and 0.0 <= late_s <= max(time_constant_s, width_s):
+            return True
+    return False
 
 
 def _followed_share(view: View) -> tuple[float, float]:
