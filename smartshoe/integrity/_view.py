@@ -99,8 +99,26 @@ class Signal:
 
     @cached_property
     def noise(self) -> Array:
-        """(m,) local standard deviation of white noise."""
+        """(m,) local standard deviation of white noise; none of what is switched between a few levels."""
+        if self.is_switched:
+            return np.zeros(self.values.size)
         return white_noise(self.values, self.thresholds, self.step)
+
+    @cached_property
+    def is_switched(self) -> bool:
+        """Whether it takes a few values only, and stays on each for longer than by chance.
+
+        The steps between them are its own then, as a drive's that is on or off. Noise between the steps of a grid is as
+        likely to be on either at each sample, whatever it was before.
+        """
+        from scipy.special import ndtri
+
+        values, count = self.levels
+        if values.size > self.thresholds.few:
+            return False
+        pairs, alike = self.values.size - 1, float(np.sum((count / self.values.size) ** 2))
+        usual, changes = pairs * (1.0 - alike), int(np.count_nonzero(np.diff(self.values)))
+        return bool(changes < usual + float(ndtri(self.thresholds.false_alarm)) * np.sqrt(usual * alike))
 
     @cached_property
     def quiet_noise(self) -> float:
