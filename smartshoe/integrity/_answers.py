@@ -15,7 +15,7 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 
 
 def answered_s(time_s: Array, load: Array, reading: Array, width_s: float, thresholds: Thresholds) -> float | None:
-    """How late a ``reading`` (n,) answers its ``load`` (n,), in bins of ``width_s``; None where it does not for certain.
+    """How late a ``reading`` (n,) answers its ``load`` (n,), in bins of ``width_s``; None where that is not certain.
 
     It answers where one correlation of innovations is beyond chance, and no other is half as large (`clear`) but the
     ``few`` beside it: of a load that repeats itself there are others, and a step or two tell nothing.
