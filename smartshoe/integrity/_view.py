@@ -20,6 +20,7 @@ from smartshoe.integrity._scales import (
 )
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
+from smartshoe.signals.noise import is_switched
 from smartshoe.stamps import usual_step_s
 
 
@@ -106,19 +107,8 @@ class Signal:
 
     @cached_property
     def is_switched(self) -> bool:
-        """Whether it takes a few values only, and stays on each for longer than by chance.
-
-        The steps between them are its own then, as a drive's that is on or off. Noise between the steps of a grid is as
-        likely to be on either at each sample, whatever it was before.
-        """
-        from scipy.special import ndtri
-
-        values, count = self.levels
-        if values.size > self.thresholds.few:
-            return False
-        pairs, alike = self.values.size - 1, float(np.sum((count / self.values.size) ** 2))
-        usual, changes = pairs * (1.0 - alike), int(np.count_nonzero(np.diff(self.values)))
-        return bool(changes < usual + float(ndtri(self.thresholds.false_alarm)) * np.sqrt(usual * alike))
+        """Whether it takes a few values only and stays on them, so that its steps are no noise."""
+        return is_switched(self.values, self.thresholds.few, self.thresholds.false_alarm)
 
     @cached_property
     def quiet_noise(self) -> float:
