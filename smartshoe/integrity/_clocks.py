@@ -260,10 +260,10 @@ def _is_answered_before(view: View, ends_s: Array, thresholds: Thresholds) -> bo
 
     Of two clocks nothing is answered before the lag is over.
     """
-    least_s, width_s = float(np.min(np.abs(ends_s))), view.step_s
     if ends_s[0] * ends_s[1] <= 0.0:
         return False
-    width_s = max(width_s, least_s / (thresholds.clear * thresholds.few))
+    least_s = float(np.min(np.abs(ends_s)))
+    width_s = max(view.step_s, least_s / (thresholds.clear * thresholds.few))
     answered = answered_s(view.time_s, view.load.values, view.reading.values, width_s, thresholds)
     return answered is not None and thresholds.clear * abs(answered) < least_s
 
