@@ -193,22 +193,34 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     else:
         middle = _slope(place, found.mean, inner)
         ends = 0.5 * (_slope(place, found.mean, upper) + _slope(place, found.mean, lower))
+        is_odd = all(_has_two_signs(one, thresholds) for one in (place, found.mean))
         sign = -1.0 if middle < 0.0 and ends < 0.0 else 1.0
         shape = (
             f"{course} {'falls' if sign < 0 else 'rises'} by {sign * middle:.3g} {unit}/{of_load} about the middle and"
             f" by {sign * ends:.3g} {unit}/{of_load} at the ends:"
-            f" {_shape(middle, ends, thresholds)}"
+            f" {_shape(middle, ends, is_odd, thresholds)}"
         )
     apart = 0.5 * float(np.median(np.abs(found.ups - found.downs)[np.abs(u) < 0.5]))
     return f"{shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"
 
 
-def _shape(middle: float, ends: float, thresholds: Thresholds) -> str:
-    """What is said of a curve by its slope about the middle and at the ends."""
+def _has_two_signs(values: Array, thresholds: Thresholds) -> bool:
+    """Whether values lie on both sides of none, and about as far."""
+    low, high = float(values.min()), float(values.max())
+    return low < 0.0 < high and min(-low, high) > thresholds.same * max(-low, high)
+
+
+def _shape(middle: float, ends: float, is_odd: bool, thresholds: Thresholds) -> str:
+    """What is said of a curve by its slope about the middle and at the ends.
+
+    Friction only where load and reading turn round together (``is_odd``): any contact flattens, its axes exchanged.
+    """
     if middle * ends < 0.0:
         return "it turns back, and no straight line describes it"
     if thresholds.clear * abs(ends) < abs(middle):
-        return "it flattens, as friction does that saturates, and no straight line or linear damping describes it"
+        if is_odd:
+            return "it flattens, as friction does that saturates, and no straight line or linear damping describes it"
+        return "it flattens, and no straight line describes it"
     if abs(ends) > thresholds.clear * abs(middle):
         return "it steepens towards the ends, and no straight line describes it"
     return "it is nearly straight"

@@ -13,7 +13,7 @@ from scipy.signal import oaconvolve
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
-from smartshoe.signals.noise import robust_sd
+from smartshoe.signals.noise import is_switched, robust_sd
 
 LATER = 9  # samples within which a reading is seen to follow, a resolution
 PLACES_PER_TAP = 3  # with as many, unrelated noise is never followed by nearly all
@@ -24,9 +24,9 @@ def noise_sd(signal: Array, thresholds: Thresholds) -> float:
     """White noise's standard deviation from third differences, which no ramp or bend reaches.
 
     The median finds the scale, the mean square of what noise reaches the value: on a converter's
-    quantisation grid a median is a whole number of steps.
+    quantisation grid a median is a whole number of steps. A load that is switched between a few levels has none.
     """
-    if signal.size < 10:
+    if signal.size < 10 or is_switched(signal, thresholds.few, thresholds.false_alarm):
         return 0.0
     third = np.diff(signal, 3)
     return float(np.sqrt(np.mean(third[_are_of_noise(third, thresholds)] ** 2) / 20.0))

@@ -88,8 +88,8 @@ def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
         return None
     return (
         f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
-        " which bears compression only (turn the sign of the load, set it to zero at rest, or take its mean out, if"
-        " that is what was meant)"
+        " which bears compression only (turn the sign of the load, or set it to zero at rest; where its mean was taken"
+        " out, add in the file what makes all of it positive)"
     )
 
 

@@ -26,7 +26,8 @@ class Excitation:
     ``present`` holds the words of `Effect.exposed_by` that apply to the load, ``channels`` those that were logged
     beside it. ``is_judged``: what is held out can be used. ``is_cycled``: a recording that is fitted has more than one
     load cycle. ``is_unread_at_rest``: it rests without load, and no reading there can be used. ``is_held``: a load is
-    borne without moving, be it for less than slow creep takes to be seen.
+    borne without moving, be it for less than slow creep takes to be seen. ``are_rated``: no more than half of the rises
+    are over within too few samples for a rate.
     """
 
     rates_per_s: tuple[float, ...]
@@ -39,6 +40,7 @@ class Excitation:
     is_unread_at_rest: bool = False
     is_held: bool = False
     channels: frozenset[str] = frozenset()
+    are_rated: bool = True
 
     def lacking(self, effect: Effect) -> frozenset[str]:
         """What would show an effect best and is neither in the loads nor logged beside them."""
@@ -82,6 +84,8 @@ class Excitation:
             )
         if len(self.rates_per_s) <= 1:
             seen = "one loading rate only" if self.rates_per_s else "no rise of the load of which the rate is seen"
+            if self.rates_per_s and not self.are_rated:
+                seen = "most rises of the load are over within too few samples to tell one loading rate from another"
             nothing = "nothing can be said of rate dependence"
             if self.rates_per_s and self.is_held:
                 nothing = "of rate dependence no more can be said than how a ramp differs from a hold"
@@ -144,9 +148,18 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     present = frozenset(word for word, is_there in found.items() if is_there)
     is_cycled = have_later_cycles(sessions, thresholds)
     is_unread = idle_s >= thresholds.settled_s and not found["rests"]
-    is_held = hold_s >= thresholds.clear * thresholds.settled_s  # for longer than a load takes to turn
+    is_held = hold_s >= _turning_s(thresholds)
     return Excitation(
-        tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled, is_unread, is_held
+        tuple(rates),
+        tuple(peaks),
+        repeats,
+        present,
+        thresholds,
+        is_judged,
+        is_cycled,
+        is_unread,
+        is_held,
+        are_rated=thresholds.clear * len(rated) >= len(rises),
     )
 
 
@@ -211,9 +224,32 @@ def _still(session: Session, thresholds: Thresholds) -> Mask:
     return np.asarray(np.abs(after - before) < thresholds.still_per_s * width * conditions.step_s + noise)
 
 
+def stays(session: Session, thresholds: Thresholds) -> Mask:
+    """(n,) True in stretches of a ``few`` logged samples within which the load moves by no more than counts as none.
+
+    A load that moves by chance at each of its samples, seconds apart, turns slowly here and there and is never held.
+    Where so few last no longer than a load takes to turn its rate says it all.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    load, few = session.conditions.load, math.ceil(thresholds.few / session.thinned)
+    if few * session.conditions.step_s <= _turning_s(thresholds):
+        return np.ones(load.size, dtype=bool)
+    few = min(few + 1 - few % 2, load.size)  # odd, so that both filters are centred
+    within = maximum_filter1d(load, few, mode="nearest") - minimum_filter1d(load, few, mode="nearest")
+    stay = (within <= thresholds.standing).astype(np.uint8)
+    return np.asarray(maximum_filter1d(stay, few, mode="constant").astype(bool))
+
+
+def _turning_s(thresholds: Thresholds) -> float:
+    """What lasts longer is no load that turns."""
+    return thresholds.clear * thresholds.settled_s
+
+
 def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
-    return np.asarray(_still(session, thresholds) & ~session.resting & (session.conditions.load > thresholds.cycle))
+    is_borne = ~session.resting & (session.conditions.load > thresholds.cycle)
+    return np.asarray(_still(session, thresholds) & stays(session, thresholds) & is_borne)
 
 
 def _rested(session: Session, thresholds: Thresholds) -> Mask:

@@ -10,6 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._denoise import noise_sd
+from smartshoe.diagnosis._excitation import stays
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, slow
 from smartshoe.diagnosis._session import Session
@@ -110,19 +111,21 @@ def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array], thresh
 
 def worst_place(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> str:
     """The bin of load and direction, and the stretch of the file's time, that hold most of the residual's slow part."""
-    load, rate, error, names = [], [], [], []
+    load, rate, stay, error, names = [], [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
         width = min(max(1, round(0.5 / session.conditions.step_s)), residual.size)
         smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
         load.append(session.conditions.load)
         rate.append(session.conditions.rate_per_s)
+        stay.append(stays(session, thresholds))
         error.append(smooth)
         names += [index] * residual.size
     loads, rates, errors = (np.concatenate(x) for x in (load, rate, error))
     power = errors**2
     total = float(power.sum()) or 1.0
     level = np.clip((loads * 4).astype(int), 0, 3)
-    direction = np.where(np.abs(rates) < thresholds.still_per_s, 0, np.where(rates > 0, 1, 2))
+    held = (np.abs(rates) < thresholds.still_per_s) & np.concatenate(stay)
+    direction = np.where(held, 0, np.where(rates > 0, 1, 2))
     table = np.zeros((3, 4))
     share = np.zeros((3, 4))
     np.add.at(table, (direction, level), power)

@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.integrity._clocks import Lags, binned, made_of
+from smartshoe.integrity._answers import binned
+from smartshoe.integrity._clocks import Lags, made_of
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity.thresholds import Thresholds

@@ -5,7 +5,8 @@ that correlates as well as the best. A unit with friction stands still after eac
 lags from zero on, and a unit with relaxation answers a corner at once: both give zero. The lags are then a straight
 line over time (an offset and a rate). Last, the line must *earn* its place: load passed through a bank of relaxations,
 powers and stop operators must fit the reading much better on the shifted clock than on the given one, as the load rises
-and as it falls.
+and as it falls; and the reading must not answer what its load does anew before that lag is over, as one that is slow by
+itself does, whatever its equation.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.integrity._answers import answered_s, binned
 from smartshoe.integrity._fault import Finding, OneClock
 from smartshoe.integrity._following import of_share
 from smartshoe.integrity._scales import five_point_median
@@ -216,7 +218,8 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
             # a constant lag from a relaxation neither way.
             agrees = agreed and after.sum() < before.sum() / (1.0 if rate else 1.0 - given.same)
             # At rising and at falling edges alike: load that the unit remembers has a lag for each direction.
-            if agrees or np.all(after <= earned * before):
+            is_earned = agrees or np.all(after <= earned * before)
+            if is_earned and not _is_answered_before(view, ends, given):
                 offered.append((float(after.sum()), offset_s, rate))
         if offered:
             return min(offered)[1:]
@@ -252,18 +255,22 @@ def _unanimous(places: Array, lags: Array, offset_s: float, rate: float, thresho
     return bool(far.sum() >= WINDOWS // 2 and np.mean(lags[far] != 0.0) >= 1.0 - thresholds.same)
 
 
+def _is_answered_before(view: View, ends_s: Array, thresholds: Thresholds) -> bool:
+    """Whether the reading answers its load in less than half of what a line is late at its ends: the unit is slow.
+
+    Of two clocks nothing is answered before the lag is over.
+    """
+    if ends_s[0] * ends_s[1] <= 0.0:
+        return False
+    least_s = float(np.min(np.abs(ends_s)))
+    width_s = max(view.step_s, least_s / (thresholds.clear * thresholds.few))
+    answered = answered_s(view.time_s, view.load.values, view.reading.values, width_s, thresholds)
+    return answered is not None and thresholds.clear * abs(answered) < least_s
+
+
 def _describes(line: Array, lags: Array, thresholds: Thresholds) -> bool:
     """Whether lags (w,) lie on a ``line`` (w,), but for a share of its longest."""
     return bool(np.median(np.abs(lags - line)) < thresholds.same * np.max(np.abs(line)))
-
-
-def binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
-    """Means over bins, empty ones interpolated."""
-    place = np.minimum(((time_s - time_s[0]) / width_s).astype(np.intp), grid.size - 1)
-    count = np.bincount(place, minlength=grid.size)
-    total = np.bincount(place, weights=values, minlength=grid.size)
-    filled = count > 0
-    return np.interp(grid, grid[filled], total[filled] / count[filled])
 
 
 def _by_windows(

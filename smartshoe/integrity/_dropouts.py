@@ -46,7 +46,11 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
 
 
 def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``dropouts``; masked: the load falls to nothing and comes back while the reading stands."""
+    """Kind ``dropouts``; masked: the load falls to nothing and comes back while the reading stands.
+
+    A reading that lags may still rise by then, so that it is asked whether it falls from where it is highest. Nor has a
+    load dropped out that falls there as a matter of course, as one that is switched on and off.
+    """
     if view.span == 0.0 or view.load_span == 0.0:
         return
     swapped = view.swapped()
@@ -54,9 +58,9 @@ def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     still = 2.0 * view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
     for first, stop in zip(*runs_of(at), strict=True):
         comes_back = stop < y.size and bool(swapped.jump[stop - 1] > 0.0)
-        # A reading that lags is on its way down by then.
-        at[first:stop] = comes_back and float(y[first - 1] - np.min(y[first : stop + 1])) < still
-    if not at.any() or not _one_level(swapped, at):
+        there = y[first - 1 : stop + 1]
+        at[first:stop] = comes_back and float(np.max(np.maximum.accumulate(there) - there)) < still
+    if not at.any() or not _one_level(swapped, at) or _as_a_matter_of_course(swapped, at):
         return
     yield replace(_finding(swapped, at, np.zeros(0)), no_load=view.whole(at))
 
@@ -155,6 +159,14 @@ def common_values(y: Array, thresholds: Thresholds) -> Array:
 def _near(view: View, level: float) -> Mask:
     within = view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
     return np.abs(view.reading.values - level) <= within
+
+
+def _as_a_matter_of_course(view: View, at: Mask) -> bool:
+    """Whether of all sudden falls to the level of those ``at`` no more than half (`clear`) are among these."""
+    starts, _ = runs_of(_near(view, float(np.median(view.reading.values[at]))))
+    falls = starts[starts > 0]
+    falls = falls[view.jump[falls - 1] < 0.0]
+    return bool(view.thresholds.clear * at[falls].sum() <= falls.size)
 
 
 def _one_level(view: View, at: Mask) -> bool:

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.integrity._answers import answered_s, binned
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
+from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.lags import lagged
@@ -28,6 +30,8 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         follows = view.thresholds.follows
         if view.thresholds.clear * (1.0 - share) <= view.thresholds.same or (share >= follows and moves_with > 0.0):
             return  # of a few samples a ramp, a load looks like noise: what is followed is none
+        if share >= follows and _answers(view):
+            return
         if (stands_still := frozen(view)) is not None:
             yield stands_still
             return
@@ -42,6 +46,12 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
                 f"the reading does not move with the load, though what is slow in it explains {100 * share:.0f} % of"
                 f" its variance: were both recorded by one clock, is this the unit that was pressed, and does it answer"
                 f" within {max(memory_s):g} s (of a slower one record several steps of the load)?"
+            )
+        if view.thresholds.clear * (went_on := _goes_on(view)) > 1.0:
+            says = (
+                f"the reading goes on while the load stands: {100 * went_on:.0f} % of its range is gone through"
+                f" more than {max(memory_s):g} s after the load's last move; whether it is the load's integral, a"
+                " slower unit or a drift cannot be told from so few levels (record several, each for a while)"
             )
         if _is_noise(view):
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
@@ -69,6 +79,42 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
 def _is_noise(view: View) -> bool:
     """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp."""
     return view.load_span <= 2.0 * view.load.largest * view.load.quiet_noise
+
+
+def _answers(view: View) -> bool:
+    """Whether what the load does anew is answered, and soon: a unit that lags by longer than its load stays.
+
+    Its reading is anywhere at any load, and moves against it as often as with it.
+    """
+    for time_constant_s in view.thresholds.memory_s:
+        width_s = max(view.step_s, time_constant_s / view.thresholds.few)
+        late_s = answered_s(view.time_s, view.load.values, view.reading.values, width_s, view.thresholds)
+        if late_s is not None and 0.0 <= late_s <= max(time_constant_s, width_s):
+            return True
+    return False
+
+
+def _goes_on(view: View) -> float:
+    """Share of the reading's range that it goes through while the load stands, once what laws remember by is over.
+
+    The largest of any stretch in which the load stays within what counts as standing.
+    """
+    given = view.thresholds
+    step_s = float(view.time_s[-1] - view.time_s[0]) / min(given.bins, view.time_s.size)
+    grid = np.arange(view.time_s[0] + 0.5 * step_s, view.time_s[-1], step_s)
+    load, reading = (
+        binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
+    )
+    within, most, first = given.standing * view.load_span, 0.0, 0
+    settling = int(np.ceil(max(given.memory_s) / step_s))
+    for last in range(1, grid.size + 1):
+        if last == grid.size or abs(float(load[last] - load[first])) > within:
+            after = reading[first + settling : last]
+            if after.size > 2 * given.few:
+                begins, ends = np.median(after[: given.few]), np.median(after[-given.few :])
+                most = max(most, abs(float(ends - begins)))
+            first = last
+    return most / max(float(np.ptp(reading)), most, 1e-300)
 
 
 def _followed_share(view: View) -> tuple[float, float]:

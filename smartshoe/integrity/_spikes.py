@@ -113,11 +113,20 @@ def spikes(view: View, bad: Mask) -> Iterator[Finding]:
             yield _finding(view, found, view.reading, view.span, "reading")
     load_gain = view.load_span / view.span
     on_load = isolated(view.load, view.reading_corner, view.thresholds.clear * load_gain, view.load_span, view.near)
+    on_load &= ~_on_a_level_of_its_own(view.load)
     if on_load.any():
         # A peak between two samples looks like a spike of a part of the span; what is beyond all of it is none.
         beyond = on_load & (np.abs(view.load.outlying) > view.load_span)
         found_on_load = _finding(view, on_load, view.load, view.load_span, "reference load")
         yield replace(found_on_load, no_load=view.whole(beyond | _stands_alone(view.load, on_load)))
+
+
+def _on_a_level_of_its_own(signal: Signal) -> Mask:
+    """(m,) samples of a signal that is switched, on levels where it also stays for longer than a spike does."""
+    y = signal.values
+    if not signal.is_switched:
+        return np.zeros(y.size, dtype=bool)
+    return np.isin(y, y[2:][(y[2:] == y[1:-1]) & (y[1:-1] == y[:-2])])
 
 
 def _stands_alone(signal: Signal, found: Mask) -> Mask:

@@ -20,6 +20,7 @@ from smartshoe.integrity._scales import (
 )
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
+from smartshoe.signals.noise import is_switched
 from smartshoe.stamps import usual_step_s
 
 
@@ -99,8 +100,15 @@ class Signal:
 
     @cached_property
     def noise(self) -> Array:
-        """(m,) local standard deviation of white noise."""
+        """(m,) local standard deviation of white noise; none of what is switched between a few levels."""
+        if self.is_switched:
+            return np.zeros(self.values.size)
         return white_noise(self.values, self.thresholds, self.step)
+
+    @cached_property
+    def is_switched(self) -> bool:
+        """Whether it takes a few values only and stays on them, so that its steps are no noise."""
+        return is_switched(self.values, self.thresholds.few, self.thresholds.false_alarm)
 
     @cached_property
     def quiet_noise(self) -> float:

@@ -30,6 +30,24 @@ def robust_sd(deviations: Array) -> float:
     return float(median) / NORMAL_QUARTILE
 
 
+def is_switched(values: Array, few: int, false_alarm: float) -> bool:
+    """Whether ``values`` (n,) are a ``few`` at most, each stayed at for longer than by chance, but for a false alarm.
+
+    The steps between them are the signal's own then, as those of a drive that is on or off. Noise between the steps of
+    a grid is as likely to be on either at each sample, whatever it was before.
+    """
+    from scipy.special import ndtri
+
+    if values.size < 2 or np.unique(values[: few * few]).size > few:  # most signals show it soon
+        return False
+    levels, count = np.unique(values, return_counts=True)
+    if levels.size > few:
+        return False
+    alike = float(np.sum((count / values.size) ** 2))
+    usual, changes = (values.size - 1) * (1.0 - alike), int(np.count_nonzero(np.diff(values)))
+    return bool(changes < usual + float(ndtri(false_alarm)) * math.sqrt(usual * alike))
+
+
 def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None, step: float = 0.0) -> float:
     """Standard deviation of the white noise on smooth ``signals`` (n,), by the median of their differences.
 

@@ -67,6 +67,23 @@ def test_the_curve_is_told(reading: Array, words: str) -> None:
     assert words in said
 
 
+@pytest.mark.parametrize(
+    ("reading", "is_of_friction"),
+    [
+        (50.0 * np.tanh(TRIANGLE / 20.0), True),
+        (60.0 + 50.0 * np.tanh(TRIANGLE / 20.0), False),
+        (60.0 + 50.0 * np.sign(TRIANGLE) * np.abs(TRIANGLE / 100.0) ** 0.25, False),
+    ],
+    ids=["odd", "of one sign", "a contact, its axes exchanged"],
+)
+def test_friction_is_named_only_where_load_and_reading_have_two_signs(reading: Array, is_of_friction: bool) -> None:
+    """What opposes a motion turns with it; a curve that flattens may be anything."""
+    said = str(_said(reading))
+    assert "it flattens" in said
+    assert ("as friction does that saturates" in said) is is_of_friction
+    assert ("damping" in said) is is_of_friction
+
+
 def test_slopes_are_those_of_the_curve() -> None:
     said = _said(3.0 * TRIANGLE)
     assert said is not None

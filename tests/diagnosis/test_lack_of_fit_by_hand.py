@@ -43,6 +43,7 @@ def _session(load: Array, cycle: Any = None, usable: Any = None, step_s: float =
     kept = np.ones(load.size, dtype=bool) if usable is None else usable
     return SimpleNamespace(
         conditions=Conditions(step_s * np.arange(load.size), load, step_s),
+        thinned=1,
         usable=kept,
         fitted=kept,
         cycle=np.zeros(load.size, dtype=np.intp) if cycle is None else cycle,
@@ -469,6 +470,17 @@ def test_a_load_is_held_below_the_slowest_ramp(by: float, words: str) -> None:
     one = _session(np.full(100, 0.5))
     one.conditions.cache["rate_per_s"] = np.full(100, by * STANDARD.still_per_s)
     assert words in worst_place([one], [np.ones(100)], STANDARD)
+
+
+def test_a_load_that_moves_at_every_sample_is_never_held() -> None:
+    """However slowly it is logged: half of its samples differ from the last by less than what counts as a ramp."""
+    steps = np.random.default_rng(2).normal(0.0, 0.06, 300)
+    load = 0.5 + np.convolve(steps, 0.8 ** np.arange(40))[:300]
+    one = _session(load, step_s=9.0)
+    slowly = np.abs(one.conditions.rate_per_s) < STANDARD.still_per_s
+    assert slowly.mean() > 0.3
+    said = worst_place([one], [1.0 * slowly], STANDARD)
+    assert "held" not in said
 
 
 def test_the_tenth_of_the_time_with_the_largest_part_is_said() -> None:

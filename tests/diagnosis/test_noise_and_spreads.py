@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._held_out import errors, gain
 from smartshoe.diagnosis._lack_of_fit import _mean_variance
 from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit
@@ -63,3 +64,14 @@ def test_where_nothing_is_held_out_no_number_is_said() -> None:
     assert [figures[name] for name in ("fit_percent", "force_rmse_n", "variance_explained_percent")] == [None] * 3
     said = Diagnosis("adequate", "", "mbar", 800.0, 140.0, explainable_percent=math.nan, explained_percent=math.nan)
     assert (said.to_dict()["explainable_percent"], said.to_dict()["explained_percent"]) == (None, None)
+
+
+def test_a_load_that_is_switched_every_few_samples_keeps_its_steps() -> None:
+    """Its differences are its own steps: lines through them would smear it by half of what it is."""
+    rng = np.random.default_rng(5)
+    load = np.repeat(rng.integers(0, 2, 300), 3).astype(float)
+    half = load[rng.integers(0, 2) :: 2]
+    assert np.median(np.abs(np.diff(half, 3))) > 0.0
+    assert noise_sd(half, Thresholds()) == 0.0
+    toggling = rng.integers(0, 2, 600).astype(float)
+    assert noise_sd(toggling, Thresholds()) > 0.3

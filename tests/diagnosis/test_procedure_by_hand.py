@@ -68,6 +68,8 @@ def test_a_load_of_both_signs_is_no_units(low: float, high: float, is_out: bool)
     assert (said is not None) is is_out
     if said is not None:
         assert f"pulled: the load runs from {low:.4g} to {high:.4g} N" in said
+        # To take out a mean is what gives a load two signs.
+        assert "where its mean was taken out, add in the file what makes all of it positive" in said
 
 
 def test_a_refusal_says_why_and_what_is_known_without_a_model() -> None:

@@ -431,6 +431,19 @@ def test_a_repeat_is_of_a_rate_and_a_peak_that_are_alike_wherever_they_lie(
     assert _shown(session).repeats == 1 + (apart < 1.25)
 
 
+def test_a_load_that_moves_by_chance_has_neither_holds_nor_one_rate() -> None:
+    """A valve that is turned at every sample, nine seconds apart: few rises last long enough for a rate."""
+    steps = np.random.default_rng(2).normal(0.0, 0.06, 300)
+    session = _session(0.5 + np.convolve(steps, 0.8 ** np.arange(40))[:300], step_s=9.0, thinned=1)
+    shown = _shown(session)
+    assert "holds" not in shown.present
+    assert not shown.is_held
+    assert "one loading rate only" not in " ".join(shown.limits())
+    # A weight that is put on for half a minute, logged as slowly, is held.
+    weights = np.repeat(np.tile([0.0, 0.8], 20), 6)
+    assert "holds" in _shown(_session(weights, step_s=9.0, thinned=1)).present
+
+
 def test_each_thing_that_lacks_has_its_sentence() -> None:
     every = frozenset({"holds", "rests", "repeats"})
     rich = Excitation((0.1, 0.5), (0.5, 1.0), 2, every, STANDARD)
@@ -439,6 +452,10 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
         (
             {"rates_per_s": (0.1,), "is_held": True},
             "one loading rate only: of rate dependence no more can be said than how a ramp differs from a hold, nor",
+        ),
+        (
+            {"rates_per_s": (0.1,), "are_rated": False},
+            "are over within too few samples to tell one loading rate from another: nothing can be said of rate",
         ),
         (
             {"present": every - {"holds"}},

@@ -74,6 +74,9 @@ def test_where_a_residual_is_largest_is_told_of_as_many_stretches_as_there_are_s
     run = _pressed(count + 1, 8.0, "short")
     load = np.linspace(0.0, 1.0, count)
     one: Any = SimpleNamespace(
-        conditions=Conditions(np.arange(count) * 1.0, load, 1.0), usable=np.ones(count, dtype=bool), recording=run
+        thinned=1,
+        conditions=Conditions(np.arange(count) * 1.0, load, 1.0),
+        usable=np.ones(count, dtype=bool),
+        recording=run,
     )
     assert worst_place([one], [load + 0.1], STANDARD).endswith(f"; the worst stretch is short, {stretch}")

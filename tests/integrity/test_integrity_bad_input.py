@@ -158,3 +158,24 @@ def test_a_sensor_that_is_merely_another_has_no_fault(name: str, reading: Array)
     noise = 5e-4 * np.ptp(reading) * np.random.default_rng(2).standard_normal(TIME_S.size)
     found = examine([_recording(force_n=LOAD_N, **{name: reading + noise})])
     assert (found.faults, found.refusals) == ((), ())
+
+
+def test_a_reading_that_goes_on_while_the_load_stands_is_told_as_such() -> None:
+    """A cell that one current empties for an hour: of its load's integral, or of a drift, one level tells nothing."""
+    time_s = np.arange(0.0, 6000.0, 2.0)
+    load_n = np.where((time_s > 600.0) & (time_s < 4200.0), 30.0, 0.0)
+    used = np.cumsum(load_n) / np.sum(load_n)
+    pressure = 420.0 - 100.0 * used - 20.0 * used**8 - 0.1 * load_n + 8.0 * (time_s > 4200.0)
+    pressure += 0.05 * np.random.default_rng(1).standard_normal(time_s.size)
+    found = examine([Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=pressure)])
+    assert [fault.kind for fault in found.faults] == ["does_not_follow_load"]
+    assert "the reading goes on while the load stands" in found.refusals[0]
+    assert "integral" in found.refusals[0]
+    assert "unit that was pressed" not in found.refusals[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_walk_beside_a_load_that_moves_does_not_go_on_while_it_stands(seed: int) -> None:
+    walk = np.cumsum(np.random.default_rng(seed).standard_normal(TIME_S.size))
+    found = examine([_recording(force_n=LOAD_N, pressure_mbar=walk)])
+    assert all("goes on while the load stands" not in said for said in found.refusals)

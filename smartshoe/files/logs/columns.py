@@ -12,7 +12,16 @@ import numpy as np
 from smartshoe.errors import InputError
 from smartshoe.files.logs._sheet import Column, Sheet
 from smartshoe.files.logs._times import check_increasing, counts_rows, time_of
-from smartshoe.files.logs.picks import Pick, names_a_column, need_quantity, need_unit, pick, titles, unit_in_file
+from smartshoe.files.logs.picks import (
+    Pick,
+    names_a_column,
+    need_quantity,
+    need_unit,
+    pick,
+    stands_for_a_load,
+    titles,
+    unit_in_file,
+)
 from smartshoe.recording import (
     COMMAND_NAME,
     LOAD_NAME,
@@ -146,6 +155,12 @@ class _Assignment:
         force = force[1:] if self.is_turned else force
         found = pick(self.sheet, force, "--force")
         in_unit = need_unit(self.sheet, found, "--force", "N")
+        of_file = unit_in_file(self.sheet.columns[found.index])
+        if of_file is not None and stands_for_a_load(of_file, in_unit, "--force"):
+            self.notes.append(
+                f"Column {self.sheet.columns[found.index].name} is in {of_file.symbol} by the file: its numbers are"
+                f" taken for {in_unit.symbol}, as --force says."
+            )
         if in_unit.quantity == "pressure":
             name = self.sheet.columns[found.index].name
             self.notes.append(f"Column {name} is a pressure: as the load it is taken for the force on 1 cm².")

@@ -13,6 +13,7 @@ from smartshoe.units import Unit, declared, find_unit
 
 # Of each option, for a person whose unit is not known.
 _USUAL = {"--time": "s, ms, us or min", "--force": "N, kN, kgf (kg), gf (of grams) or lbf"}
+LOADS = ("force", "pressure")  # quantities that a load may have
 _CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
 
 
@@ -117,12 +118,18 @@ def _usual(option: str) -> str:
 def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:
     column = sheet.columns[index]
     of_file = unit_in_file(column)
-    if said is not None and of_file is not None and of_file.quantity != "unknown" and said != of_file:
+    is_other = said is not None and of_file is not None and of_file.quantity != "unknown" and said != of_file
+    if said is not None and of_file is not None and is_other and not stands_for_a_load(of_file, said, option):
         raise UnitError(
             f"{sheet.path}: column {column.name!r} is in {of_file.symbol} by the file, {option} says {said.symbol}:"
             " leave the unit out"
         )
     return Pick(index, said or of_file)
+
+
+def stands_for_a_load(of_file: Unit, said: Unit, option: str) -> bool:
+    """Whether brackets say of what is no load, as a way, that its numbers stand in the load's place."""
+    return option == "--force" and said.quantity in LOADS and of_file.quantity not in (*LOADS, "unknown")
 
 
 def need_unit(sheet: Sheet, found: Pick, option: str, example: str) -> Unit:
@@ -151,7 +158,7 @@ def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example
         elif in_unit.quantity == "unknown":
             also = f", or say in brackets what it is in ({_usual(option)})"
         if quantity == "force" and in_unit.quantity == "length":  # a unit that is stretched is diagnosed as any other
-            also = f", or take the unit out of its title and say '[{example}]' to use its numbers in the load's place"
+            also = f", or write '[{example}]' behind its name to use its numbers in the load's place"
         raise UnitError(
             f"{sheet.path}: column {sheet.columns[found.index].name!r} for {option} is in {in_unit.symbol}, which is"
             f" no {quantity}: choose a column in a unit such as {example}{also}"

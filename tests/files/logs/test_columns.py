@@ -105,13 +105,28 @@ FAULTS = [
     ({"sensors": ["bare"]}, InputError, r"no unit.*'bare\[mbar\]'"),
     ({"time": "bare"}, InputError, r"no unit.*'bare\[s\]'"),
     ({"force": "Pin"}, UnitError, "is in V, which is no force"),
-    ({"force": "way"}, UnitError, r"is in mm, which is no force: .* take the unit out of its title and say '\[N\]'"),
+    ({"force": "way"}, UnitError, r"is in mm, which is no force: .* write '\[N\]' behind its name to use its"),
     ({"time": "Load"}, UnitError, "is in N, which is no time"),
     ({"force": "Load[kN]"}, UnitError, "is in N by the file"),
     ({"force": "bare[furlong]"}, UnitError, "furlong"),
     ({"force": "bare[g]"}, UnitError, r"unit 'g' in --force 'bare\[g\]' is a mass: write '\[gf\]'"),
     ({"force": "Load", "sensors": ["Load"]}, InputError, "chosen twice"),
 ]
+
+
+@pytest.mark.parametrize("choice", ["way[N]", "way (mm)[N]", "5[N]"])
+def test_what_is_no_force_stands_in_the_loads_place_where_brackets_say_so(choice: str) -> None:
+    """A unit that is pulled by a way is diagnosed as any other; what the file calls it stays in the notes."""
+    log = sheet("time|s", "Load|N", "Pin|V", "bare", "way|mm")
+    log.columns[4].label = "way (mm)"
+    found = recording_from(log, force=choice, sensors=["Pin"])
+    assert (found.load.name, found.load.unit.symbol) == ("force", "N")
+    assert found.force_n == pytest.approx(log.columns[4].values)
+    assert "Column way is in mm by the file: its numbers are taken for N, as --force says." in found.notes
+    with pytest.raises(UnitError, match="is in N by the file, --force says kPa: leave the unit out"):
+        recording_from(log, force="Load[kPa]")
+    with pytest.raises(UnitError, match="is in V by the file, --sensor says mbar: leave the unit out"):
+        recording_from(log, force="Load", sensors=["Pin[mbar]"])
 
 
 @pytest.mark.parametrize(("choices", "error", "says"), FAULTS)
