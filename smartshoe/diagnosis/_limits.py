@@ -172,7 +172,8 @@ def bent_to_the_end_of(model: ExtendedModel) -> str | None:
 
 def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
     """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
-    is_of_gas = any(part.effect.stage == "gas" for part in model.parts)
+    units = {one.recording.sensor.unit.quantity for one in sessions}
+    is_of_gas = any(part.effect.stage == "gas" for part in model.parts) and units.isdisjoint(NO_PRESSURES)
     if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # one is known
         return None
     softest, stiffest = PAPER_WALL_RATIOS

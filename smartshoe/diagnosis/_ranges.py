@@ -41,7 +41,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
         gain = float(np.median([gain for gain in within if gain is not None]))
         through_zero = float(np.median([reading.mean() / load.mean() for load, reading in kept]))
         lowest = min(range(len(kept)), key=lambda k: float(kept[k][0].min()))
-        low, high = np.quantile(kept[lowest][0], [0.01, 0.99]) * scale.load_n
+        low, high = (float(of(kept[lowest][0])) * scale.load_n for of in (np.min, np.max))
         is_gauge = scale.unit.quantity == "pressure"  # the zero of others is a convention, through which no line goes
         trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
