@@ -8,27 +8,30 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._view import View
+from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import UNIFORM_SD
+
+
+def coarse_step(values: Array, thresholds: Thresholds) -> float:
+    """The usual step of the grid that readings (n,) lie on; 0 where there is none, or noise takes it out in the mean.
+
+    Whatever the load does: also where that stands still, and the reading's standing is no fault of its grid.
+    """
+    return _coarse_step(Signal(values, thresholds)) if values.size else 0.0
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``quantisation``; nothing is masked, since every sample has it.
 
-    A grid adds an error. It is a fault where that is material, and more than the share of the noise by which two
-    noises count as the same: more noise dithers the grid and hides it.
+    A grid adds an error. It is a fault where that is material, and the reading stays on a level as the load goes on.
     """
-    step = view.reading.local_step
-    on_grid = step > 0.0
-    if on_grid.mean() < 1.0 - view.thresholds.same or view.span == 0.0:
-        return
-    if not _stands_while_load_moves(view, step):
-        return
-    usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
+    usual = _coarse_step(view.reading)
     error = UNIFORM_SD * usual
-    noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
-    if error < view.thresholds.material * view.span or error < view.thresholds.same * noise:
+    if view.span == 0.0 or error == 0.0 or error < view.thresholds.material * view.span:
+        return
+    if not _stands_while_load_moves(view, view.reading.local_step):
         return
     yield Finding(
         "quantisation",
@@ -38,6 +41,21 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         " does not remove",
         error=error,
     )
+
+
+def _coarse_step(reading: Signal) -> float:
+    """The usual step; 0 where its error is less than the share of the noise by which two noises count as the same.
+
+    More noise dithers the grid and hides it.
+    """
+    step, thresholds = reading.local_step, reading.thresholds
+    on_grid = step > 0.0
+    if on_grid.mean() < 1.0 - thresholds.same:
+        return 0.0
+    usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
+    error = UNIFORM_SD * usual
+    noise = float(np.sqrt(max(reading.quiet_noise**2 - error**2, 0.0)))
+    return 0.0 if error < thresholds.same * noise else usual
 
 
 def _stands_while_load_moves(view: View, step: Array) -> bool:
