@@ -19,19 +19,30 @@ def coarse_step(values: Array, thresholds: Thresholds) -> float:
 
     Whatever the load does: also where that stands still, and the reading's standing is no fault of its grid.
     """
-    return _coarse_step(Signal(values, thresholds)) if values.size else 0.0
+    if not values.size:
+        return 0.0
+    reading = Signal(values, thresholds)
+    step = reading.local_step
+    if (step > 0.0).mean() < 1.0 - thresholds.same:
+        return 0.0
+    usual = float(np.median(step[step > 0.0]))  # beyond what is often read the distance between neighbours is no step
+    return 0.0 if _is_hidden(UNIFORM_SD * usual, reading) else usual
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``quantisation``; nothing is masked, since every sample has it.
 
-    A grid adds an error. It is a fault where that is material, and the reading stays on a level as the load goes on.
+    A grid adds an error. It is a fault where that is material, and no noise hides it.
     """
-    usual = _coarse_step(view.reading)
-    error = UNIFORM_SD * usual
-    if view.span == 0.0 or error == 0.0 or error < view.thresholds.material * view.span:
+    step = view.reading.local_step
+    on_grid = step > 0.0
+    if on_grid.mean() < 1.0 - view.thresholds.same or view.span == 0.0:
         return
-    if not _stands_while_load_moves(view, view.reading.local_step):
+    if not _stands_while_load_moves(view, step):
+        return
+    usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
+    error = UNIFORM_SD * usual
+    if error < view.thresholds.material * view.span or _is_hidden(error, view.reading):
         return
     yield Finding(
         "quantisation",
@@ -43,19 +54,13 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     )
 
 
-def _coarse_step(reading: Signal) -> float:
-    """The usual step; 0 where its error is less than the share of the noise by which two noises count as the same.
+def _is_hidden(error: float, reading: Signal) -> bool:
+    """Whether an ``error`` is less than the share of the noise by which two noises count as the same.
 
     More noise dithers the grid and hides it.
     """
-    step, thresholds = reading.local_step, reading.thresholds
-    on_grid = step > 0.0
-    if on_grid.mean() < 1.0 - thresholds.same:
-        return 0.0
-    usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
-    error = UNIFORM_SD * usual
     noise = float(np.sqrt(max(reading.quiet_noise**2 - error**2, 0.0)))
-    return 0.0 if error < thresholds.same * noise else usual
+    return error < reading.thresholds.same * noise
 
 
 def _stands_while_load_moves(view: View, step: Array) -> bool:

@@ -438,6 +438,10 @@ def test_a_change_must_be_clear_of_the_step_a_reading_is_rounded_to() -> None:
     for one in (_run(0, 0.0), _run(1, 0.0)):
         (fine,) = _sessions(one)
         assert rounded_to(fine, CURVED, STANDARD) == 0.0
+    with_one_far_off = _held(0, 1.4, 0.1)
+    values = np.where(np.arange(TIME_S.size) % 190 == 7, 280.0, with_one_far_off.sensors[0].values)
+    (far,) = _sessions(with_one_far_off.with_channel(replace(with_one_far_off.sensors[0], values=values)), factor=1)
+    assert rounded_to(far, CURVED, STANDARD) == pytest.approx(0.01, rel=1e-6)
     (jumped,) = _sessions(_changed(_run(0, 0.0), 14.0, 0.015), factor=1)
     at = int(np.searchsorted(jumped.conditions.time_s, 14.0))
     changed = replace(jumped, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
