@@ -18,6 +18,7 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
+from smartshoe.diagnosis._jumps import any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._residual_structure import beyond_noise
@@ -30,9 +31,7 @@ from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
-# Resolutions: how many moments of a recording a gain, or its zero, may change at, and how often.
-MOMENTS = 60
-MOST_CHANGES = 6
+MOST_CHANGES = 6  # a resolution: how often a recording's gain, or its zero, may change, in the mean
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,8 @@ class _Gained:
     @property
     def odds_of_a_change(self) -> float:
         """-2 log prior odds against one: of one effect among all, at one of the moments of the recordings."""
-        return self.evidence.odds + 2.0 * math.log(MOMENTS * len(self.evidence.given.sessions))
+        each = (moments_of(one, self.evidence.thresholds).size for one in self.evidence.given.sessions)
+        return self.evidence.odds + 2.0 * math.log(max(sum(each), 1))
 
     def searched(self) -> _Gained:
         """The same with the best set beside them."""
@@ -126,7 +126,8 @@ def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[S
 def _with_jumping_zeros(state: State, sessions: Sequence[Session], rivals: Sequence[_Gained]) -> _Gained | None:
     """``sessions`` with zeros that change at moments where that is told, and likelier than each of ``rivals``.
 
-    What a zero leaves that jumps is no noise, and hides what else is there: noise is what is left between moments.
+    What a zero leaves that jumps is no noise, and hides what else is there: noise is what is left between moments. At
+    so little much else is followed by steps, so that one of them must be a jump for certain.
     """
     if _left_by(state.fit.model, sessions, state.thresholds) <= state.thresholds.tolerable:
         return None  # no effect does what such a zero does
@@ -137,12 +138,9 @@ def _with_jumping_zeros(state: State, sessions: Sequence[Session], rivals: Seque
         return None
     score = jumping.score_beside(sessions)
     quiet = (_Gained.of(state, one.sessions, noise_sd).searched() for one in rivals)
-    return jumping if all(score < one.score_beside(sessions) for one in quiet) else None
-
-
-def _moments_of(session: Session) -> Index:
-    """(`MOMENTS`,) samples at which something may change."""
-    return np.arange(1, MOMENTS + 1) * session.reading.size // (MOMENTS + 1)
+    if any(score >= one.score_beside(sessions) for one in quiet):
+        return None
+    return jumping if any_jumps(jumping.sessions, jumping.model(state), state.thresholds) else None
 
 
 def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
@@ -150,8 +148,9 @@ def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
     left, kept, free = [], [], 0  # degrees of freedom
     for one in fitted_of(sessions):
         residual = residual_of(one, state.fit.model)
-        part = np.searchsorted(_moments_of(one), np.arange(residual.size), side="right")
-        sums, counts = (np.bincount(part[one.fitted], of, MOMENTS + 1) for of in (residual[one.fitted], None))
+        moments = moments_of(one, state.thresholds)
+        part = np.searchsorted(moments, np.arange(residual.size), side="right")
+        sums, counts = (np.bincount(part[one.fitted], of, moments.size + 1) for of in (residual[one.fitted], None))
         left.append(residual - (sums / np.maximum(counts, 1))[part])
         kept.append(one.fitted)
         free += int(one.fitted.sum()) - int(np.count_nonzero(counts))
@@ -180,11 +179,15 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     if len(fitted) > MOST_FOLDS:
         return gained
     model, zero_sd = state.given.model, state.thresholds.strength_sd if of_zero else 0.0
-    moments = [_moments_of(one) for one in fitted]
+    moments = [moments_of(one, state.thresholds) for one in fitted]
+    ends = np.cumsum([one.size for one in moments])
+    if not ends[-1]:
+        return gained
     moved = [
         np.full(one.reading.size, zero_sd) if of_zero else one.own_gain_sd * model.simulate(one.conditions)
         for one in fitted
     ]
+    rounded = [rounded_to(one, model, state.thresholds) for one in fitted] if of_zero else []
     steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
     none = [replace(one, starts=one.starts[:0]) for one in steps]
     for _ in range(MOST_CHANGES * len(fitted)):
@@ -192,17 +195,18 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
         each = zip(fitted_of(gained.sessions), moments, strict=True)
         falls[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
         while falls.max() >= gained.odds_of_a_change:
-            k, j = divmod(int(np.argmax(falls)), MOMENTS)
-            one = fitted_of(gained.sessions)[k]
+            best = int(np.argmax(falls))
+            k = int(np.searchsorted(ends, best, side="right"))
+            one, j = fitted_of(gained.sessions)[k], best - int(ends[k]) + moments[k].size
             # Between the moments beside it, so that what changes once is not told as two changes around it.
-            around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
+            around = np.arange(*(one.reading.size * beside // (moments[k].size + 1) for beside in (j, j + 2)))[1:]
             around = around[_may_change(one, around)]
             alone = [*none[:k], StepColumns.of(one, moved[k], around), *none[k + 1 :]]
             at = int(around[np.argmax(gained.evidence.falls_beside(gained.kept, alone))])
             changed = _changed(one, at, zero_sd)
-            if not of_zero or _is_abrupt(changed, at, state.fit.model, state.thresholds):
+            if not of_zero or may_jump(changed, at, state.fit.model, rounded[k], state.thresholds):
                 break
-            falls[k * MOMENTS + j] = -math.inf  # beside others it may be seen to be no stair
+            falls[best] = -math.inf  # beside others it may be seen to be no stair
         else:
             break
         sessions = [changed if other is one else other for other in gained.sessions]
@@ -214,19 +218,6 @@ def _may_change(session: Session, at: Index) -> Mask:
     """(k,) at which samples something may change: what is undone within a load cycle is what that cycle did."""
     known = session.cycle[[*session.gain_changes, *session.zero_changes]]
     return np.isin(session.cycle[at], known, invert=True)
-
-
-def _is_abrupt(session: Session, at: int, model: ExtendedModel, thresholds: Thresholds) -> bool:
-    """Whether the zero changes ``at`` a sample by what its change there amounts to, and not ever more on either side.
-
-    What creeps through a hold is followed by a stair; between the moments beside a step of it next to nothing happens.
-    """
-    ((_, _, steps),) = _own_of_each([session], model)
-    share = session.zero_sd * float(steps[session.zero_changes.index(at)])
-    left, near = residual_of(session, model), session.reading.size // (MOMENTS + 1)
-    before, after = (left[part][session.fitted[part]] for part in (slice(max(at - near, 0), at), slice(at, at + near)))
-    seen = share + (float(after.mean() - before.mean()) if before.size and after.size else 0.0)
-    return thresholds.clear * seen * math.copysign(1.0, share) >= abs(share)
 
 
 def _changed(session: Session, at: int, zero_sd: float) -> Session:

@@ -2,6 +2,7 @@
 
 from smartshoe.integrity._examination import examine
 from smartshoe.integrity._fault import DataFault, Integrity, OneClock
+from smartshoe.integrity._quantisation import coarse_step
 from smartshoe.integrity._twins import Twin, twins
 
-__all__ = ["DataFault", "Integrity", "OneClock", "Twin", "examine", "twins"]
+__all__ = ["DataFault", "Integrity", "OneClock", "Twin", "coarse_step", "examine", "twins"]

@@ -8,16 +8,31 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._view import View
+from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import UNIFORM_SD
+
+
+def coarse_step(values: Array, thresholds: Thresholds) -> float:
+    """The usual step of the grid that readings (n,) lie on; 0 where there is none, or noise takes it out in the mean.
+
+    Whatever the load does: also where that stands still, and the reading's standing is no fault of its grid.
+    """
+    if not values.size:
+        return 0.0
+    reading = Signal(values, thresholds)
+    step = reading.local_step
+    if (step > 0.0).mean() < 1.0 - thresholds.same:
+        return 0.0
+    usual = float(np.median(step[step > 0.0]))  # beyond what is often read the distance between neighbours is no step
+    return 0.0 if _is_hidden(UNIFORM_SD * usual, reading) else usual
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``quantisation``; nothing is masked, since every sample has it.
 
-    A grid adds an error. It is a fault where that is material, and more than the share of the noise by which two
-    noises count as the same: more noise dithers the grid and hides it.
+    A grid adds an error. It is a fault where that is material, and no noise hides it.
     """
     step = view.reading.local_step
     on_grid = step > 0.0
@@ -27,8 +42,7 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         return
     usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
     error = UNIFORM_SD * usual
-    noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
-    if error < view.thresholds.material * view.span or error < view.thresholds.same * noise:
+    if error < view.thresholds.material * view.span or _is_hidden(error, view.reading):
         return
     yield Finding(
         "quantisation",
@@ -38,6 +52,15 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         " does not remove",
         error=error,
     )
+
+
+def _is_hidden(error: float, reading: Signal) -> bool:
+    """Whether an ``error`` is less than the share of the noise by which two noises count as the same.
+
+    More noise dithers the grid and hides it.
+    """
+    noise = float(np.sqrt(max(reading.quiet_noise**2 - error**2, 0.0)))
+    return error < reading.thresholds.same * noise
 
 
 def _stands_while_load_moves(view: View, step: Array) -> bool:

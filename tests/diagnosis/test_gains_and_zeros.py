@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from told_evidence import taken_for_exact
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds, _gains_and_zeros
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gains_and_zeros import (
-    MOMENTS,
     OwnGain,
     ZeroChange,
     _Gained,
-    _is_abrupt,
     _loaded_about,
     changes_of,
     foretells,
@@ -32,6 +31,7 @@ from smartshoe.diagnosis._gains_and_zeros import (
     zero_changes_of,
 )
 from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._jumps import MOMENTS, any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
@@ -273,7 +273,7 @@ def test_what_creeps_is_no_zero_that_jumps(of_step: float, is_jump: bool) -> Non
     (session,) = _sessions(run.with_channel(replace(reading, values=reading.values + SPAN_MBAR * 0.02 * more)))
     at = int(np.searchsorted(session.conditions.time_s, 17.0))
     changed = replace(session, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
-    assert _is_abrupt(changed, at, CURVED, STANDARD) is is_jump
+    assert may_jump(changed, at, CURVED, 0.0, STANDARD) is is_jump
 
 
 @pytest.mark.parametrize(("of_step", "is_jump"), [(0.0, False), (1.0, True)])
@@ -285,7 +285,7 @@ def test_what_creeps_at_the_very_beginning_is_no_zero_that_jumps(of_step: float,
     moved = run.with_channel(replace(reading, values=reading.values + SPAN_MBAR * 0.02 * more))
     (session,) = _sessions(moved, factor=1)
     changed = replace(session, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
-    assert _is_abrupt(changed, at, CURVED, STANDARD) is is_jump
+    assert may_jump(changed, at, CURVED, 0.0, STANDARD) is is_jump
 
 
 def test_where_nothing_jumps_no_moment_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -295,7 +295,7 @@ def test_where_nothing_jumps_no_moment_is_taken(monkeypatch: pytest.MonkeyPatch)
     state = _state(CURVED, sessions)
     found = _Gained(sessions, Evidence(state.evidence.given, SD), state.start)
     assert with_changes(state, found, of_zero=True) is not found
-    monkeypatch.setattr(_gains_and_zeros, "_is_abrupt", lambda *given: False)
+    monkeypatch.setattr(_gains_and_zeros, "may_jump", lambda *given: False)
     assert with_changes(state, found, of_zero=True) is found
 
 
@@ -349,3 +349,146 @@ def test_of_many_recordings_no_changes_are_asked_for(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(Evidence, "falls_beside", lambda *given: pytest.fail("asked for"))
     gained = _Gained.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions], SD)
     assert with_changes(state, gained) is gained
+
+
+# -- what steps follow, and is no jump --------------------------------------------------------------------------------
+def _recorded(number: int, load: Array, reading_mbar: Array) -> Recording:
+    return Recording.from_arrays(time_s=TIME_S, force_n=800.0 * load, pressure_mbar=reading_mbar, name=f"run_{number}")
+
+
+def _is_told_to_jump(runs: list[Recording], factor: int = 4) -> bool:
+    sessions = _sessions(*runs, factor=factor)
+    told = with_likelier_gains(_state(CURVED, sessions), sessions)
+    return told is not None and any(one.zero_changes for one in told)
+
+
+def _changed(run: Recording, begins_s: float, share: float) -> Recording:
+    values = run.sensors[0].values + SPAN_MBAR * share * (run.time_s >= begins_s)
+    return run.with_channel(replace(run.sensors[0], values=values))
+
+
+def _curved(number: int, by: float, power: float, above: float) -> Recording:
+    """Pressed once and let go: above a load that differs a little by recording it reads more, by a power."""
+    load = 1.0 - 2.0 * np.abs(TIME_S / TIME_S[-1] - 0.5)
+    beyond = np.clip((load - above - 0.02 * number) / (1.0 - above), 0.0, None)
+    share = CURVED.simulate(Conditions(TIME_S, load, STEP_S)) + by * (1.0 + 0.2 * number) * beyond**power
+    noise = 0.001 * np.random.default_rng([number, 1]).standard_normal(TIME_S.size)
+    return _recorded(number, load, SPAN_MBAR * (share + noise))
+
+
+def _held(number: int, step_mbar: float, creeps: float) -> Recording:
+    """Held once and let go, with a creep of no law of the model, in whole steps of the reading."""
+    load = np.interp(
+        TIME_S, [0.0, 1.0, 1.1, 15.0 - 3 * (number % 2), 15.1 - 3 * (number % 2), 40.0], [0, 0, 1, 1, 0, 0]
+    )
+    left = np.exp(-STEP_S / (6.0 + 2.0 * number))
+    share = CURVED.simulate(Conditions(TIME_S, load, STEP_S)) + creeps * lfilter([1.0 - left], [1.0, -left], load)
+    return _recorded(number, load, step_mbar * np.round(SPAN_MBAR * share / step_mbar))
+
+
+def _wandering(number: int, sd: float, memory_s: float, seed: int) -> Recording:
+    """Noise that remembers: the next sample is a share of the last one, and something new."""
+    run = _run(number, 0.0)
+    new = np.random.default_rng([number, seed]).standard_normal(TIME_S.size + 2000)
+    level = lfilter([1.0], [1.0, -np.exp(-STEP_S / memory_s)], new)[2000:]
+    return run.with_channel(
+        replace(run.sensors[0], values=run.sensors[0].values + SPAN_MBAR * sd * level / level.std())
+    )
+
+
+@pytest.mark.parametrize(("power", "above"), [(8.0, 0.0), (8.0, 0.9), (20.0, 0.0), (20.0, 0.9)])
+def test_recordings_of_fewer_samples_than_moments_are_asked_at_fewer(power: float, above: float) -> None:
+    """58 samples: moments fell together, or no sample lay between two, and that alone was told for noise."""
+    runs = [_curved(k, 0.2, power, above) for k in range(3)]
+    (session, *_) = _sessions(*runs, factor=7)
+    assert session.reading.size < MOMENTS
+    apart = np.diff([0, *moments_of(session, STANDARD), session.reading.size])
+    assert apart.min() >= STANDARD.few
+    assert not _is_told_to_jump(runs, factor=7)
+
+
+@pytest.mark.parametrize("size", [0, 4, 9, 10, 57, 304, 305, 306, 12_000])
+def test_between_two_moments_are_enough_samples_to_tell_the_noise(size: int) -> None:
+    session: Any = SimpleNamespace(reading=np.zeros(size))
+    moments = moments_of(session, STANDARD)
+    assert moments.size == max(min(MOMENTS, size // STANDARD.few - 1), 0)
+    assert np.all(np.diff([0, *moments, max(size, STANDARD.few)]) >= STANDARD.few)
+
+
+@pytest.mark.parametrize(
+    ("by", "power", "above", "factor"),
+    [(0.1, 4.0, 0.0, 1), (0.1, 8.0, 0.9, 1), (0.2, 8.0, 0.9, 1), (0.2, 4.0, 0.9, 4), (0.2, 20.0, 0.9, 1)],
+)
+def test_what_a_curve_reads_at_the_highest_loads_is_no_jump(by: float, power: float, above: float, factor: int) -> None:
+    assert not _is_told_to_jump([_curved(k, by, power, above) for k in range(3)], factor)
+
+
+@pytest.mark.parametrize(("step_mbar", "creeps"), [(1.4, 0.03), (2.8, 0.03), (2.8, 0.1)])
+@pytest.mark.parametrize("factor", [1, 4])
+def test_a_reading_that_creeps_in_its_own_steps_does_not_jump(step_mbar: float, creeps: float, factor: int) -> None:
+    assert not _is_told_to_jump([_held(k, step_mbar, creeps) for k in range(4)], factor)
+
+
+def test_a_change_must_be_clear_of_the_step_a_reading_is_rounded_to() -> None:
+    """Of 1.4 mbar, 1 % of full scale, whatever the load does; noise as large takes it out in the mean."""
+    (session,) = _sessions(_held(0, 1.4, 0.1), factor=1)
+    assert rounded_to(session, CURVED, STANDARD) == pytest.approx(0.01, rel=1e-6)
+    in_bar = replace(CURVED, full_scale_reading=1e-3 * SPAN_MBAR, reading_unit="bar")
+    assert rounded_to(session, in_bar, STANDARD) == pytest.approx(0.01, rel=1e-6)
+    for one in (_run(0, 0.0), _run(1, 0.0)):
+        (fine,) = _sessions(one)
+        assert rounded_to(fine, CURVED, STANDARD) == 0.0
+    with_one_far_off = _held(0, 1.4, 0.1)
+    values = np.where(np.arange(TIME_S.size) % 190 == 7, 280.0, with_one_far_off.sensors[0].values)
+    (far,) = _sessions(with_one_far_off.with_channel(replace(with_one_far_off.sensors[0], values=values)), factor=1)
+    assert rounded_to(far, CURVED, STANDARD) == pytest.approx(0.01, rel=1e-6)
+    (jumped,) = _sessions(_changed(_run(0, 0.0), 14.0, 0.015), factor=1)
+    at = int(np.searchsorted(jumped.conditions.time_s, 14.0))
+    changed = replace(jumped, zero_changes=(at,), zero_sd=STANDARD.strength_sd)
+    assert may_jump(changed, at, CURVED, 0.007, STANDARD)
+    assert not may_jump(changed, at, CURVED, 0.008, STANDARD)
+
+
+@pytest.mark.parametrize(
+    ("sd", "memory_s", "seed"), [(0.01, 3.0, 2), (0.01, 10.0, 0), (0.02, 3.0, 0), (0.03, 3.0, 2), (0.03, 10.0, 0)]
+)
+def test_noise_that_remembers_does_not_jump(sd: float, memory_s: float, seed: int) -> None:
+    assert not _is_told_to_jump([_wandering(k, sd, memory_s, seed) for k in range(3)])
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.02, True), (0.0, False)])
+def test_a_zero_jumps_beside_noise_that_remembers_where_it_is_clear_of_that(share: float, is_told: bool) -> None:
+    runs = [_wandering(k, 0.002, 1.0, 5) for k in range(3)]
+    assert _is_told_to_jump([runs[0], _changed(runs[1], 14.0, share), runs[2]], factor=1) is is_told
+
+
+def _at_once(session: Session, *begins_s: float) -> Session:
+    at = tuple(int(one) for one in np.searchsorted(session.conditions.time_s, begins_s))
+    return replace(session, zero_changes=at, zero_sd=STANDARD.strength_sd)
+
+
+def test_a_jump_is_there_again_at_a_load_that_moves_as_before() -> None:
+    """3 % more from a moment on; of one press at loads above 60 %, as a curve has it, or as it is let go, as a loop."""
+    presses, press = (np.interp(TIME_S, np.linspace(0.0, 40.0, 2 * k + 1), [0, *[1, 0] * k]) for k in (4, 1))
+    for load, more, begins_s, jumps in (
+        (presses, TIME_S >= 14.0, (14.0,), True),
+        (press, TIME_S >= 14.0, (14.0,), False),
+        (press, press > 0.6, (12.0, 28.0), False),
+        (press, TIME_S >= 20.0, (20.0,), False),
+    ):
+        share = CURVED.simulate(Conditions(TIME_S, load, STEP_S)) + 0.03 * more
+        (session,) = _sessions(_recorded(0, load, SPAN_MBAR * share), factor=1)
+        assert any_jumps([_at_once(session, *begins_s)], CURVED, STANDARD) is jumps
+    alone = replace(session, zero_changes=tuple(range(1, 2 * MOMENTS, 2)), zero_sd=STANDARD.strength_sd)
+    assert not any_jumps([alone], CURVED, STANDARD)  # no moment is left that tells what it is elsewhere
+
+
+def test_what_is_elsewhere_as_large_or_is_more_than_its_share_is_no_jump() -> None:
+    """3 % more from 14 s on, where the reading wanders as far; and for 4 s of a recording that is as before then."""
+    (quiet,) = _sessions(_changed(_run(0, 0.0), 14.0, 0.03), factor=1)
+    (loud,) = _sessions(_changed(_wandering(0, 0.03, 3.0, 1), 14.0, 0.03), factor=1)
+    assert any_jumps([_at_once(quiet, 14.0)], CURVED, STANDARD)
+    assert not any_jumps([_at_once(loud, 14.0)], CURVED, STANDARD)
+    (passing,) = _sessions(_changed(_changed(_run(0, 0.0), 24.0, 0.03), 28.0, -0.03), factor=1)
+    assert not any_jumps([_at_once(passing, 24.0)], CURVED, STANDARD)
+    assert any_jumps([_at_once(passing, 24.0), _at_once(quiet, 14.0)], CURVED, STANDARD)
