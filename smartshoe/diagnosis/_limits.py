@@ -23,7 +23,6 @@ from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect, in_words, listed
-from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import Unit
@@ -106,7 +105,7 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
 
 def of_no_gas(name: Name, unit: Unit) -> str | None:
     """What is said of what a gas remembers, where the reading is none of a gas's pressure."""
-    if unit.quantity not in NO_PRESSURES or name.effect.stage != "gas" or not isinstance(name.effect, CoreEffect):
+    if unit.quantity not in NO_PRESSURES or name.effect.stage != "gas" or name.effect.is_memoryless:
         return None
     return _unnamed(
         name,
