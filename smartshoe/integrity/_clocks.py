@@ -195,6 +195,8 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
     grid, places = of.grid, of.places
+    if _movements(of, given) < given.few:
+        return None
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
     as_logged, repeating = None, _repeats_itself(of.load, given)
@@ -224,6 +226,16 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
         if offered:
             return min(offered)[1:]
     return None
+
+
+def _movements(of: _Followed, thresholds: Thresholds) -> int:
+    """How often the load begins to rise, or to fall: of one or two a curve's rise is late, and its fall early, too."""
+    from scipy.ndimage import gaussian_filter1d
+
+    width_s = float(of.grid[1] - of.grid[0])
+    moves = gaussian_filter1d(of.load, max(of.smooth_s / width_s, 1.0), order=1)
+    way = np.where(np.abs(moves) > thresholds.faulty_share * np.max(np.abs(moves)), np.sign(moves), 0.0)
+    return int(np.count_nonzero((way != 0.0) & (np.diff(way, prepend=0.0) != 0.0)))
 
 
 def _is_one_sine(load: Array, thresholds: Thresholds) -> bool:
