@@ -58,11 +58,14 @@ def clocks_of(
     drifting = {place for place in there if alone[place].rate}
     apart, compared = {*there}, {*there} - drifting  # what drifts as no other does is put right by what it tells alone
     if borne is not None:
-        apart = {place for place in there if place >= count and _is_off(alone[place], borne, thresholds)}
+        judging = (place for place in there if place >= count and alone[place].lags.at_s.size)
+        apart = {place for place in judging if not _goes_by(borne, alone[place], thresholds)}
         compared = {*fitted} | apart - drifting
         own_s = {place: (own_s.get(place) or alone[place].lags.middle_s) - beside_s[place] for place in apart}
     masks = [mask & (place in compared) for place, mask in enumerate(usable)]
     found = apart_s(recordings, masks, [one.lags for one in alone], thresholds, Told(own_s, borne, count))
+    if borne is None and shared is not None:  # what parts slowly is farther apart the longer a recording lasts
+        found = {place: by for place, by in found.items() if not _goes_by(shared, alone[place], thresholds)}
     others = {place for place in apart if place >= count and (place in found or alone[place].is_told)}
     return Clocks(
         None if any(place < count for place in found) else shared,
@@ -72,6 +75,6 @@ def clocks_of(
     )
 
 
-def _is_off(alone: Alone, clock: OneClock, thresholds: Thresholds) -> bool:
-    """Whether lags are seen that are none of a ``clock``."""
-    return bool(alone.lags.at_s.size) and not alone.lags.are_of(clock, thresholds)
+def _goes_by(clock: OneClock, alone: Alone, thresholds: Thresholds) -> bool:
+    """Whether lags are seen that are those of a ``clock``."""
+    return bool(alone.lags.at_s.size) and alone.lags.are_of(clock, thresholds)

@@ -15,8 +15,9 @@ from scipy.signal import lfilter
 from smartshoe.diagnosis import Thresholds, diagnose
 from smartshoe.diagnosis._aligned import _is_load_known, aligned, as_they_follow
 from smartshoe.diagnosis._characteristic import friction_of
-from smartshoe.integrity import OneClock, examine
+from smartshoe.integrity import OneClock, _own_clocks, examine
 from smartshoe.integrity._clocks import UNSEEN, Lags, _correlation, _peak, one_clock
+from smartshoe.integrity._own_clocks import Alone
 from smartshoe.recording import Recording
 
 STANDARD = Thresholds()
@@ -341,6 +342,27 @@ def test_a_drift_that_one_recording_tells_and_others_follow_is_one_cause() -> No
     assert float(parts[0][1][0]) == pytest.approx(drift, rel=0.25)
     causes = {cause.name: cause for cause in diagnose(runs, hold_out=[_ramps(0.0, drift, seed=5)]).causes}
     assert causes["clock_drift"].parameters["clock_rate_error"].value == pytest.approx(drift, rel=0.02)
+
+
+@pytest.mark.parametrize(("parts", "own"), [(0.0, {}), (0.3, {2: 0.3})])
+def test_what_one_pair_of_clocks_accounts_for_is_no_lag_of_a_recordings_own(
+    monkeypatch: pytest.MonkeyPatch, parts: float, own: dict[int, float]
+) -> None:
+    """Clocks that part by a tenth of a second in five minutes, too little to be told of any recording alone."""
+    rate = -3.4e-4
+    each = [
+        _seen([rate * at_s for at_s in moments], moments) for moments in ([20, 130, 270], [30, 250], [60, 110, 190])
+    ]
+    each[2] = replace(each[2], lag_s=each[2].lag_s + parts)
+    monkeypatch.setattr(_own_clocks, "apart_s", lambda *told: {2: parts or -0.0376})
+    runs = [_ramps(0.0)] * 3
+    found = _own_clocks.clocks_of(
+        runs, [run.sensor.present for run in runs], [Alone(lags=one) for one in each], 3, STANDARD
+    )
+    assert found.found == own
+    assert (found.shared is None) is bool(own)
+    if not own:
+        assert found.shared == OneClock(pytest.approx(0.0, abs=1e-9), pytest.approx(rate))
 
 
 # -- diagnoses --------------------------------------------------------------------------------------------------------
