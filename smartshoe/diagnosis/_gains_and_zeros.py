@@ -17,7 +17,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._evidence import Evidence, Members
-from smartshoe.diagnosis._held_out import own_of, residual_of
+from smartshoe.diagnosis._held_out import changes_in, own_of, residual_of
 from smartshoe.diagnosis._jumps import any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._noise import correlated_sd
@@ -303,9 +303,7 @@ def _own_of_each(sessions: Sequence[Session], model: ExtendedModel) -> Iterator[
     """Each fitted recording with its own gains (k,) and the changes of its zero (l,)."""
     for one in fitted_of(sessions):
         own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
-        first, last = 2 + len(one.gain_parts), 2 + len(one.gain_parts) + len(one.zero_changes)
-        gains, steps = own[2:first], own[first:last]
-        yield one, gains, steps
+        yield one, *changes_in(one, own)
 
 
 def _time_s(session: Session, at: int) -> float:

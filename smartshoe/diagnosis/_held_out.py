@@ -83,6 +83,12 @@ def _told_by(session: Session, pole_per_s: float) -> Mask:
     return told
 
 
+def changes_in(session: Session, own: Array) -> tuple[Array, Array]:
+    """Its own gains (k,) and the changes of its zero (l,) among what is a recording's own, as `own_of` has it."""
+    first, last = 2 + len(session.gain_parts), 2 + len(session.gain_parts) + len(session.zero_changes)
+    return own[2:first], own[first:last]
+
+
 def residual_of(session: Session, model: ExtendedModel) -> Array:
     """(n,) reading less simulation less what is the recording's own, in shares of full scale."""
     residual = session.reading - model.simulate(session.conditions)

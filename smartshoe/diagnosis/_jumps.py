@@ -13,7 +13,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Index
-from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._held_out import changes_in, own_of
+from smartshoe.diagnosis._scale import reading_in
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity import coarse_step
 from smartshoe.integrity.thresholds import Thresholds
@@ -31,8 +32,8 @@ def moments_of(session: Session, thresholds: Thresholds) -> Index:
 
 def rounded_to(session: Session, model: ExtendedModel, thresholds: Thresholds) -> float:
     """The step of a recording's reading where it is coarse beside its noise, a share of full scale; else 0."""
-    sensor, to = session.recording.sensor, find_unit(model.reading_unit)
-    values = sensor.values if to is None else sensor.unit.convert(sensor.values, to)
+    sensor = session.recording.sensor
+    values = reading_in(session.recording, find_unit(model.reading_unit) or sensor.unit)
     return coarse_step(values[sensor.present], thresholds) / abs(model.full_scale_reading)
 
 
@@ -88,8 +89,7 @@ def _changes_of(session: Session, model: ExtendedModel) -> tuple[Array, Array]:
     """By what a session's zero changes (l,), shares of full scale, and what is left beside that (n,)."""
     residual = session.reading - model.simulate(session.conditions)
     own, added = own_of(session, model, residual)
-    first = 2 + len(session.gain_parts)
-    return session.zero_sd * own[first : first + len(session.zero_changes)], residual - added
+    return session.zero_sd * changes_in(session, own)[1], residual - added
 
 
 def _is_alike(seen: float, share: float, thresholds: Thresholds) -> bool:

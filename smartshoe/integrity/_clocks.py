@@ -147,13 +147,15 @@ def _least_lag_s(view: View) -> float:
 class _Followed:
     """Load and reading over even bins at ``grid`` (b,) and how late the reading follows in each of some windows.
 
-    ``places`` (w,) are the windows' middles in s, ``smallest`` and ``best`` lags in s, ``weights`` correlations.
+    ``movements``: how often the load begins to rise, or to fall. ``places`` (w,) are the windows' middles in s,
+    ``smallest`` and ``best`` lags in s, ``weights`` correlations.
     """
 
     grid: Array
     load: Array
     reading: Array
     smooth_s: float
+    movements: int
     places: Array
     smallest: Array
     best: Array
@@ -195,7 +197,7 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
     grid, places = of.grid, of.places
-    if _movements(of, given) < given.few:
+    if of.movements < given.few:  # of one or two a curve's rise is late, and its fall early, too
         return None
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
@@ -226,16 +228,6 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
         if offered:
             return min(offered)[1:]
     return None
-
-
-def _movements(of: _Followed, thresholds: Thresholds) -> int:
-    """How often the load begins to rise, or to fall: of one or two a curve's rise is late, and its fall early, too."""
-    from scipy.ndimage import gaussian_filter1d
-
-    width_s = float(of.grid[1] - of.grid[0])
-    moves = gaussian_filter1d(of.load, max(of.smooth_s / width_s, 1.0), order=1)
-    way = np.where(np.abs(moves) > thresholds.faulty_share * np.max(np.abs(moves)), np.sign(moves), 0.0)
-    return int(np.count_nonzero((way != 0.0) & (np.diff(way, prepend=0.0) != 0.0)))
 
 
 def _is_one_sine(load: Array, thresholds: Thresholds) -> bool:
@@ -329,7 +321,13 @@ def _by_windows(
     if not places:
         return None
     each = (np.array(one) for one in (places, smallest, peaks, weights))
-    return _Followed(grid, load, reading, smooth_s, *each)
+    return _Followed(grid, load, reading, smooth_s, _movements(d_load, moving), *each)
+
+
+def _movements(increments: Array, moving: Mask) -> int:
+    """How often a load of these increments (b,) begins to rise, or to fall, where it is ``moving`` (b,)."""
+    way = np.where(moving, np.sign(increments), 0.0)
+    return int(np.count_nonzero((way != 0.0) & (np.diff(way, prepend=0.0) != 0.0)))
 
 
 def _without_jumps(increments: Array, moving: Mask, thresholds: Thresholds) -> Array:

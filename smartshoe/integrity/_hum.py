@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View, toggling
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -27,7 +28,7 @@ def hum(view: View, bad: Mask) -> Iterator[Finding]:
     for frequency_hz, amplitude in found:
         folded = aliases(frequency_hz, rate_hz, float(view.time_s[-1] - view.time_s[0]))
         origin = f" ({' or '.join(folded)})" if folded else ""
-        parts.append(f"{frequency_hz:.4g} Hz{origin} with {100 * amplitude / view.span:.2g} %")
+        parts.append(f"{frequency_hz:.4g} Hz{origin} with {percent(amplitude / view.span)}")
     yield Finding(
         "hum",
         np.ones(len(view.recording), dtype=bool),

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds
@@ -48,7 +49,7 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         "quantisation",
         np.ones(len(view.recording), dtype=bool),
         f"the reading is quantised in steps of {usual:.4g} {view.recording.sensor.unit.symbol},"
-        f" {100 * usual / view.span:.2g} % of its span: an rms error of {100 * error / view.span:.2g} % that averaging"
+        f" {percent(usual / view.span)} of its span: an rms error of {percent(error / view.span)} that averaging"
         " does not remove",
         error=error,
     )

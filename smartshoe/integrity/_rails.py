@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from smartshoe.arrays import Mask
+from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
@@ -25,11 +26,11 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
     stands = _noise_stands_still(view, tied, top, -1.0)
     if hidden <= least and not stands and not _is_known(view, top):
         return
-    cut = f", and about {100 * hidden / view.span:.2g} % of the span is cut off" if hidden > least else ""
+    cut = f", and about {percent(hidden / view.span)} of the span is cut off" if hidden > least else ""
     yield Finding(
         "saturation",
         view.whole(tied),
-        f"{int(tied.sum())} readings ({100 * float(tied.mean()):.2g} %) are exactly {view.sign * top:.6g}"
+        f"{int(tied.sum())} readings ({percent(float(tied.mean()))}) are exactly {view.sign * top:.6g}"
         f" {view.recording.sensor.unit.symbol} at the loaded end: the sensor or its converter saturates there{cut}",
         masks=True,
         rail=view.sign * top,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.display import moment
+from smartshoe.display import moment, percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
@@ -81,7 +81,7 @@ def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
         "gaps",
         at,
         f"{f'a gap of {longest_s}' if wide.sum() == 1 else f'{int(wide.sum())} gaps in time, the longest {longest_s}'}:"
-        f" about {f'{lost} samples' if lost > 1 else 'one sample'} ({100 * share:.2g} % of all) missing",
+        f" about {f'{lost} samples' if lost > 1 else 'one sample'} ({percent(share)} of all) missing",
         "minor" if share < thresholds.faulty_share else "material",
     )
 
@@ -98,7 +98,7 @@ def uneven_sampling(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
     yield Finding(
         "uneven_sampling",
         at,
-        f"the sampling step varies: {100 * float(at.mean()):.2g} % of the steps differ from the usual"
+        f"the sampling step varies: {percent(float(at.mean()))} of the steps differ from the usual"
         f" {usual:.4g} s by more than {100 * thresholds.same:.0f} %"
         f" (from {float(step.min()):.3g} to {moment(float(step.max()), 3)} s)",
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array, Index
+from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._scales import ROUNDING
 from smartshoe.integrity._view import Signal
@@ -45,8 +46,8 @@ def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recordi
             "quantisation",
             np.ones(len(recording), dtype=bool),
             f"the load is quantised in steps of {signal.step:.4g} {channel.unit.symbol},"
-            f" {100 * signal.step / span:.2g} % of its span: it was drawn through the moments at which it goes from one"
-            f" to the next, and is known to half a step where it stands, an rms error of {100 * error / span:.2g} %",
+            f" {percent(signal.step / span)} of its span: it was drawn through the moments at which it goes from one"
+            f" to the next, and is known to half a step where it stands, an rms error of {percent(error / span)}",
             error=gain * error,
         )
     ]

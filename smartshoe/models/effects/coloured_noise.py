@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.display import percent
 from smartshoe.models.effects._sensor_evidence import NoiseEffect, SensorEvidence, Waveformless
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.effects.exposure import by
@@ -74,7 +75,7 @@ class ColouredNoise(Waveformless, NoiseEffect):
         strength, tau_s = math.sqrt(power), memory * conditions.step_s
         says = (
             f"what differs between equal load cycles is correlated over about {tau_s:.2g} s: "
-            f"coloured noise of {100 * strength:.2g} % of full scale"
+            f"coloured noise of {percent(strength)} of full scale"
         )
         return SensorEvidence("first_order_noise_score", value, threshold, says, strength)
 

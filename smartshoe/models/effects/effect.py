@@ -57,6 +57,10 @@ class EffectParameter:
     absent: float | None = None
     natural: Literal["", "lower", "upper", "both"] = ""
 
+    def either_way(self, says: str) -> EffectParameter:
+        """A strength with as much room on the other side of null, which ``says`` another thing then."""
+        return self if self.null is None else replace(self, says=says, lower=2.0 * self.null - self.upper)
+
     def is_stretched(self, value: float) -> bool:
         """Whether a value lies at a bound that is not a natural one."""
         below, above = self.natural not in ("lower", "both"), self.natural not in ("upper", "both")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.arrays import Array
+from smartshoe.display import percent
 from smartshoe.models.effects._sensor_evidence import (
     ONE_SIDED,
     PRESSURE,
@@ -31,5 +32,5 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
         if found is None:
             return None
         value, strength, _ = found
-        says = f"the noise grows with pressure: {100 * strength:.2g} % of full scale are added at the largest pressure"
+        says = f"the noise grows with pressure: {percent(strength)} of full scale are added at the largest pressure"
         return SensorEvidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)

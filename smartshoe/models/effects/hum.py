@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.display import percent
 from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, NoiseEffect, SensorEvidence
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
@@ -110,7 +111,7 @@ class Hum(NoiseEffect):
         origin = (
             f", where {' or '.join(f'{source:g}' for source in sources)} Hz of the mains come out" if sources else ""
         )
-        says = f"a tone of {100 * math.hypot(cosine, sine):.2g} % of full scale at {frequency:.4g} Hz{origin}"
+        says = f"a tone of {percent(math.hypot(cosine, sine))} of full scale at {frequency:.4g} Hz{origin}"
         return HumEvidence("line_over_floor", ratio, threshold, says, strength, frequency, cosine, sine, sources)
 
 

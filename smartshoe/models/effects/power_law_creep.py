@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CoreEffect, EffectParameter
@@ -60,10 +59,8 @@ class _CreepingEitherWay(PowerLawCreep):
 
     says = "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time"
     parameters = (
-        replace(
-            PowerLawCreep.parameters[0],
-            says="relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds",
-            lower=-2.0,
+        PowerLawCreep.parameters[0].either_way(
+            "relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds"
         ),
         PowerLawCreep.parameters[1],
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
@@ -44,10 +42,8 @@ class _RelaxingEitherWay(SecondRelaxation):
 
     says = "the sensor relaxes with a second time constant: the reading goes on in holds, and back in rests"
     parameters = (
-        replace(
-            SecondRelaxation.parameters[0],
-            says="what relaxes by the second time constant, over what does not; < 0: the reading falls in holds",
-            lower=-2.0,
+        SecondRelaxation.parameters[0].either_way(
+            "what relaxes by the second time constant, over what does not; < 0: the reading falls in holds"
         ),
         SecondRelaxation.parameters[1],
     )
