@@ -28,8 +28,7 @@ ROOM = __name__.rpartition(".")[0]
 
 def _concrete(kind: Any) -> list[type[Effect]]:
     below = [leaf for child in kind.__subclasses__() for leaf in _concrete(child)]
-    is_one = not (getattr(kind, "__abstractmethods__", None) or kind.__name__.startswith("_"))  # `Effect.of_any_sensor`
-    return [kind, *below] if is_one else below
+    return below if getattr(kind, "__abstractmethods__", None) else [kind, *below]
 
 
 @cache

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
+from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -56,10 +58,6 @@ class EffectParameter:
     kind_ends: Literal["", "lower", "upper", "both"] = ""
     absent: float | None = None
     natural: Literal["", "lower", "upper", "both"] = ""
-
-    def either_way(self, says: str) -> EffectParameter:
-        """A strength with as much room on the other side of null, which ``says`` another thing then."""
-        return self if self.null is None else replace(self, says=says, lower=2.0 * self.null - self.upper)
 
     def is_stretched(self, value: float) -> bool:
         """Whether a value lies at a bound that is not a natural one."""
@@ -204,6 +202,8 @@ class Effect(ABC):
     ``branch``: which of its family's, where that has several that may be there together and be told for one another.
     ``never_fades``: True where what past loads left behind stays as it is until the next ones, as friction does.
     ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
+    ``of_either_sign``: what it and its strength say where the strength may have either sign, as the reading of any
+    other sensor than a gas's pressure may fall as well as creep up in holds; None of one whose sign is what it is.
     """
 
     name: ClassVar[str]
@@ -234,6 +234,7 @@ class Effect(ABC):
     mechanism: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
     is_steep_undone: ClassVar[bool] = False
+    of_either_sign: ClassVar[tuple[str, str] | None] = None
 
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
@@ -264,7 +265,7 @@ class Effect(ABC):
 
     def of_any_sensor(self) -> Effect:
         """The same of a reading that is no pressure: stress, and what a polymer conducts, may give way in holds."""
-        return self
+        return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
 
     def departs_by(self, values: Array) -> float:
         """Of a block that follows what no law does: by what share of itself it differs from a law."""
@@ -317,6 +318,18 @@ class Effect(ABC):
     def is_null(self, values: Array) -> bool:
         """Whether every strength is at its null value."""
         return all(p.null is None or value == p.null for p, value in zip(self.parameters, values, strict=True))
+
+
+@cache
+def _of_either_sign(effect: Effect, says: str, of_strength: str) -> Effect:
+    """``effect`` with as much room on the other side of null."""
+    strengths = (
+        one if one.null is None else replace(one, says=of_strength, lower=2.0 * one.null - one.upper)
+        for one in effect.parameters
+    )
+    made = copy(effect)
+    vars(made).update(says=says, parameters=tuple(strengths))
+    return made
 
 
 class CoreEffect(Effect):

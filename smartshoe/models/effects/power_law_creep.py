@@ -42,28 +42,13 @@ class PowerLawCreep(CoreEffect):
         "play_hysteresis": by("rates"),
         "second_relaxation": by("steps", "long_hold"),
     }
-
-    def of_any_sensor(self) -> PowerLawCreep:
-        """What is held may creep up or give way."""
-        return _EITHER_WAY
+    of_either_sign = (
+        "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time",
+        "relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds",
+    )
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """The ladder's arms."""
         creep, exponent = (float(value) for value in values)
         times = [SHORTEST_S * 10.0 ** (SPACING * k) for k in range(ARMS)]
         return tuple(relaxing(creep * SPACING * tau**-exponent, 1.0 / tau) for tau in times)
-
-
-class _CreepingEitherWay(PowerLawCreep):
-    """The same of either sign."""
-
-    says = "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time"
-    parameters = (
-        PowerLawCreep.parameters[0].either_way(
-            "relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds"
-        ),
-        PowerLawCreep.parameters[1],
-    )
-
-
-_EITHER_WAY = _CreepingEitherWay()

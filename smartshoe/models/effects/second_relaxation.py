@@ -27,26 +27,11 @@ class SecondRelaxation(CoreEffect):
         "power_law_creep": by("steps", "long_hold"),
         "sensor_lag": by("steps"),
     }
-
-    def of_any_sensor(self) -> SecondRelaxation:
-        """What is held may creep up or give way."""
-        return _EITHER_WAY
+    of_either_sign = (
+        "the sensor relaxes with a second time constant: the reading goes on in holds, and back in rests",
+        "what relaxes by the second time constant, over what does not; < 0: the reading falls in holds",
+    )
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One arm."""
         return (relaxing(float(values[0]), 1.0 / float(values[1])),)
-
-
-class _RelaxingEitherWay(SecondRelaxation):
-    """The same of either sign."""
-
-    says = "the sensor relaxes with a second time constant: the reading goes on in holds, and back in rests"
-    parameters = (
-        SecondRelaxation.parameters[0].either_way(
-            "what relaxes by the second time constant, over what does not; < 0: the reading falls in holds"
-        ),
-        SecondRelaxation.parameters[1],
-    )
-
-
-_EITHER_WAY = _RelaxingEitherWay()
