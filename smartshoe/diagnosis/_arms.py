@@ -125,7 +125,4 @@ def _at_their_end(few: Iterable[Fit]) -> list[Fit]:
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:
-    for part in model.parts:
-        if isinstance(part.effect, CoreEffect):
-            model = model.without(part.name)
-    return model
+    return model.without(*(part.name for part in model.parts if isinstance(part.effect, CoreEffect)))

@@ -76,8 +76,8 @@ class Contest:
 
     @cached_property
     def _of_less(self) -> tuple[ExtendedModel, list[Array]]:
-        model, kept = self.cause.model, self.without.model.names
-        return self._begun(replace(model, parts=tuple(one for one in model.parts if one.name in kept)))
+        model = self.cause.model
+        return self._begun(model.without(*({*model.names} - {*self.without.model.names})))
 
     def _begun(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array]]:
         """Where a fit begins, whatever protocol is run, and what it begins with of this data."""

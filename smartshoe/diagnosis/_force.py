@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,7 +58,7 @@ class Compensation:
     @cached_property
     def undone(self) -> ExtendedModel:
         """What of ``model`` a filter of readings undoes."""
-        return _without(self.model, self.filter.not_inverted)
+        return self.model.without(*self.filter.not_inverted)
 
     @cached_property
     def zero(self) -> float:
@@ -222,19 +222,13 @@ def _off_n(session: Session, model: ExtendedModel) -> Array:
     """
     started_s = session.conditions.before.get("time_s", 0.0)
     compensator = _compensator(model, session, started_s)
-    undone = _without(model, compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
+    undone = model.without(*compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
     read = undone.simulate(session.conditions)
     _, own = own_of(session, undone, session.reading - read)
     if session.conditions.before:
         rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
         own = own + read - undone.simulate(rested)
     return _off_by_n(session, model, compensator, own)
-
-
-def _without(model: ExtendedModel, names: Iterable[str]) -> ExtendedModel:
-    for name in names:
-        model = model.without(name)
-    return model
 
 
 def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:

@@ -19,12 +19,12 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import changes_in, own_of, residual_of
 from smartshoe.diagnosis._jumps import any_jumps, may_jump, moments_of, rounded_to
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._search import needed, search
 from smartshoe.diagnosis._session import Session, fitted_of
-from smartshoe.diagnosis._state import State, with_members
+from smartshoe.diagnosis._state import State, fit_of
 from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of, fitted_rms
 from smartshoe.display import moment
@@ -90,8 +90,7 @@ class _Gained:
         if self.evidence is state.evidence:
             return state.fit.model
         likelihood = Likelihood(self.sessions, self.evidence.noise_sd, state.fit.model, state.thresholds)
-        best = self.evidence.posterior(self.kept)
-        return fit(likelihood, with_members(state.given, best, state.fit.model, likelihood), FEW_STEPS).model
+        return fit_of(state, self.evidence.posterior(self.kept), likelihood, FEW_STEPS).model
 
     def score_beside(self, sessions: Sequence[Session]) -> float:
         """-2 log of its evidence, with the odds against what it has and ``sessions`` have not."""

@@ -35,7 +35,7 @@ from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
 from smartshoe.diagnosis._settling import Progress, better_from, better_from_one, law_or_block, settled, simpler
-from smartshoe.diagnosis._state import State, evidence_about, searched, state_at, with_members
+from smartshoe.diagnosis._state import State, evidence_about, fit_of, searched, state_at
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import listed
@@ -184,7 +184,7 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     likelihood, most = state.likelihood(), error_of(sessions, plain.model)
     left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
-    whole = fit(likelihood, with_members(given, best, extended.model, likelihood))
+    whole = fit_of(state, best, likelihood)
     extended = left_out.following(whole)
     refused = [name for name in whole.model.names if name not in extended.model.names]
     best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name not in refused))
@@ -291,8 +291,8 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
         best = begun.evidence.posterior((*begun.start, k))
         if best.score >= nothing.score:
             continue
-        one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
-        validated = _validated(State(begun.evidence, best, one), plain, sessions)
+        one = State(begun.evidence, best, fit_of(begun, best, likelihood))
+        validated = _validated(one, plain, sessions)
         removed = before**2 - error_of(sessions, validated.fit.model) ** 2
         if not validated.is_stepped_down and removed > thresholds.tolerable**2:
             standing.append((begun.given.candidates[k].effect, validated))
@@ -311,8 +311,7 @@ def _nearest(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Eff
     for k in additions(begun.evidence, begun.start, 2 * BREADTH):
         one = begun.given.candidates[k]
         if not one.effect.is_flexible:
-            best = begun.evidence.posterior((*begun.start, k))
-            fitted = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood), FEW_STEPS)
+            fitted = fit_of(begun, begun.evidence.posterior((*begun.start, k)), likelihood, FEW_STEPS)
             left.append((error_of(sessions, fitted.model), one.effect))
     least, effect = min(left, key=lambda pair: pair[0], default=(before, None))
     return (effect, before, least) if effect is not None and thresholds.clear * least**2 <= before**2 else None

@@ -9,7 +9,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, wei
 from smartshoe.diagnosis._members import Alternative, Member, fit_with
 from smartshoe.diagnosis._search import SWAPS
 from smartshoe.diagnosis._sensitivity import Candidate, available
-from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
+from smartshoe.diagnosis._state import State, evidence_about, fit_of, state_at
 from smartshoe.models.effects import Effect, blocks
 from smartshoe.models.extended import ExtendedModel
 
@@ -26,8 +26,7 @@ def with_laws(given: State, plain: ExtendedModel) -> State:
     state, about = given, given.fit.model
     flexible = [one for one in given.chosen if one.effect.is_flexible]
     if not {one.name for one in flexible} <= {*about.names}:  # the last search asked for one that is not fitted yet
-        likelihood = given.likelihood()
-        about = fit(likelihood, with_members(given.given, given.best, about, likelihood), FEW_STEPS).model
+        about = fit_of(given, given.best, given.likelihood(), FEW_STEPS).model
     for block in flexible:
         found = _law_of(block, state, about, plain, state.likelihood())
         if found is not None:
@@ -88,10 +87,7 @@ def _law_of(
 ) -> tuple[float, Fit] | None:
     """The law that follows nearly as well as a flexible block of ``about``, and what share of it that law misses."""
     thresholds, is_curve = state.thresholds, block.effect.is_memoryless
-    bare = about.without(block.name)
-    for part in bare.parts:
-        if is_curve and part.effect.is_memoryless:
-            bare = bare.without(part.name)
+    bare = about.without(block.name, *(part.name for part in about.parts if is_curve and part.effect.is_memoryless))
     nothing = fit(likelihood, bare, FEW_STEPS)
     flexible = weighed(likelihood, about).cost
     explained = min(nothing.cost, likelihood.cost(plain)) - flexible

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -128,7 +128,7 @@ def _without(name: str, model: ExtendedModel) -> ExtendedModel:
     part = model.part(name)
     if not (part.effect.is_memoryless and part.kind_ends_at):
         return model.without(name)
-    return replace(model, parts=tuple(one for one in model.parts if not one.effect.is_memoryless))
+    return model.without(*(one.name for one in model.parts if one.effect.is_memoryless))
 
 
 def _shapes_beside(best: Posterior, member: int, evidence: Evidence) -> dict[str, list[Mapping[str, float]]]:

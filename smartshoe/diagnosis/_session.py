@@ -99,6 +99,11 @@ def fitted_of(sessions: Iterable[Session]) -> tuple[Session, ...]:
     return tuple(session for session in sessions if session.fitted.any())
 
 
+def all_fitted(sessions: Iterable[Session]) -> list[Session]:
+    """The same, of which nothing is held out."""
+    return [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions]
+
+
 def prepare(
     recordings: Sequence[Recording],
     usable: Sequence[Mask],

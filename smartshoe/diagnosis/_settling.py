@@ -10,7 +10,7 @@ from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, additions
 from smartshoe.diagnosis._sensitivity import Linearised
-from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
+from smartshoe.diagnosis._state import State, evidence_about, fit_of, state_at
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.models.effects import listed
 from smartshoe.models.effects.effect import CoreEffect
@@ -39,10 +39,7 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
         seen.add(here)
         progress(f"fitting {listed(here[1]) or 'the baseline'}")
         likelihood = state.likelihood()
-        fits = [
-            fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
-            for one in _promising(state)
-        ]
+        fits = [fit_of(state, one, likelihood, ROUND_STEPS) for one in _promising(state)]
         found, given = _best_of(fits, state)
         if known is not None and any(_are_alike(found.model, one, likelihood) for one in known.path):
             return known
@@ -84,7 +81,7 @@ def better_from_one(begun: State, state: State, progress: Progress) -> State:
     likelihood, fits = state.likelihood(), []
     if effect_count(state.fit.model) - effect_count(begun.fit.model) > 1:
         few = [begun.evidence.posterior((*begun.start, k)) for k in additions(begun.evidence, begun.start, RIVALS)]
-        fits = [fit(likelihood, with_members(begun.given, one, begun.fit.model, likelihood)) for one in few]
+        fits = [fit_of(begun, one, likelihood) for one in few]
     if any(part.effect.is_latency or isinstance(part.effect, CoreEffect) for part in state.fit.model.parts):
         fits.append(late_beside_usual_arm(begun))
     one = min(fits, key=lambda one: one.cost, default=begun.fit)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
-from smartshoe.diagnosis._likelihood import Fit, Likelihood
+from smartshoe.diagnosis._likelihood import MOST_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import search, step
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
 from smartshoe.diagnosis._session import Session
@@ -110,15 +110,17 @@ def _bends(found: Posterior, start: Members, thresholds: Thresholds) -> bool:
     return max(new, default=0.0) > thresholds.linear
 
 
+def fit_of(state: State, found: Posterior, likelihood: Likelihood, steps: int = MOST_STEPS) -> Fit:
+    """A fit of the set ``found``, from the model of ``state``."""
+    return fit(likelihood, with_members(state.given, found, state.fit.model, likelihood), steps)
+
+
 def with_members(given: Linearised, found: Posterior, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:
     """``model`` with exactly the effects that were found; new ones on the way to their linear estimates.
 
     As far as is best of several lengths: a curve that is far from straight is far from its linear estimate.
     """
-    names = {given.candidates[m].name for m in found.members}
-    for part in model.parts:
-        if part.name not in names:
-            model = model.without(part.name)
+    model = model.without(*({*model.names} - {given.candidates[m].name for m in found.members}))
     new = [
         (given.candidates[member], strengths / given.scales[list(given.candidates[member].columns)])
         for member, strengths in zip(found.members, found.strengths, strict=True)

@@ -13,7 +13,7 @@ from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.diagnosis._session import Session, all_fitted, fitted_of
 from smartshoe.display import percent
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -71,7 +71,7 @@ def off_elsewhere(
     of loads of which nothing was learnt.
     """
     apart = [(one, left) for one, left in zip(sessions, residuals, strict=True) if one.held_out.all()]
-    off = beyond_noise(_all_fitted([one for one, _ in apart]), [left for _, left in apart], thresholds)
+    off = beyond_noise(all_fitted([one for one, _ in apart]), [left for _, left in apart], thresholds)
     seen = np.concatenate([left[one.usable] for one, left in apart]) if apart else np.zeros(1)
     white = float(seen @ seen) / max(seen.size, 1) - off**2
     chance = largest_of_noise(1, thresholds) * math.sqrt(2.0 / max(seen.size, 1)) * white
@@ -100,7 +100,7 @@ def not_shown_to_be_noise(
     0 where it is tolerable, or no more than what is ``known`` to be a fault's of the data, or than laws depart by of
     what was wrong ``before`` their causes, residuals as well.
     """
-    every = _all_fitted(sessions)
+    every = all_fitted(sessions)
     size = beyond_noise(every, residuals, thresholds)
     expected = 0.0 if before is None else thresholds.departure * beyond_noise(every, before, thresholds)
     return 0.0 if left.is_noise or size <= max(thresholds.tolerable, known, expected) else size
@@ -108,12 +108,8 @@ def not_shown_to_be_noise(
 
 def left_where_judged(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:
     """Rms beyond white noise of what is held out: the most that a better model could do away with there."""
-    judged = [replace(one, usable=one.judged, held_out=np.zeros_like(one.held_out)) for one in sessions]
-    return beyond_noise(judged, residuals, thresholds)
-
-
-def _all_fitted(sessions: Sequence[Session]) -> list[Session]:
-    return [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions]
+    judged = [replace(one, usable=one.judged) for one in sessions]
+    return beyond_noise(all_fitted(judged), residuals, thresholds)
 
 
 def not_explained_of(rest: ResidualStructure, elsewhere: float, unproven: float, thresholds: Thresholds) -> str | None:
@@ -150,7 +146,7 @@ def sentence_of(
     if baseline.is_empty:
         good = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
     left = "" if not_explained is None else f"; {not_explained}"
-    by_all = f"{percent(best.rmse)}"
+    by_all = percent(best.rmse)
     if verdict == "adequate":
         return f"{good}{left}"
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtrit
@@ -19,7 +19,7 @@ from smartshoe.diagnosis._baseline import is_stretched
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of, past_of, residual_of
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
+from smartshoe.diagnosis._session import Session, all_fitted, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, shift_of
 from smartshoe.models.extended import ExtendedModel
@@ -74,8 +74,7 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
     """
     if is_stretched(model):
         return None
-    begun = (one for one in sessions if one.usable.any() and "continues" not in one.recording.metadata)
-    there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in begun]
+    there = all_fitted(one for one in sessions if one.usable.any() and "continues" not in one.recording.metadata)
     if not there:
         return None
     each = offsets(there, model)
@@ -157,10 +156,8 @@ def _drifted(session: Session, model: ExtendedModel) -> Array:
 
 
 def _without_what_rests_show(model: ExtendedModel, *, but_for_drifts: bool = False) -> ExtendedModel:
-    for part in model.parts:
-        if part.effect.is_seen_at_rest and not (but_for_drifts and part.effect.goes_with_the_clock):
-            model = model.without(part.name)
-    return model
+    at_rest = (part for part in model.parts if part.effect.is_seen_at_rest)
+    return model.without(*(one.name for one in at_rest if not (but_for_drifts and one.effect.goes_with_the_clock)))
 
 
 def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> bool:

@@ -115,9 +115,10 @@ class ExtendedModel:
         """The effect ``name`` in it; KeyError where it is not."""
         return {part.name: part for part in self.parts}[name]
 
-    def without(self, name: str) -> ExtendedModel:
-        """This model without the effect ``name``."""
-        return replace(self, parts=tuple(part for part in self.parts if part.name != name))
+    def without(self, *names: str) -> ExtendedModel:
+        """This model without the named effects; itself where it has none of them."""
+        kept = tuple(part for part in self.parts if part.name not in names)
+        return replace(self, parts=kept) if len(kept) < len(self.parts) else self
 
     @cached_property
     def names(self) -> tuple[str, ...]:

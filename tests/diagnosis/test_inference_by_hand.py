@@ -354,8 +354,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     stepped, left_out = set[str](), {"n0": 3.0, "n1": 1.0, "n2": 2.0, "n3": 0.5, "n4": 2.5, "n5": 0.1, "n6": 0.1}
     errors = {"plain": 0.01, **dict.fromkeys(left_out, 0.009)}
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: errors[model])
-    monkeypatch.setattr(_inference, "with_members", lambda given, best, model, likelihood: f"n{best.members[0]}")
-    monkeypatch.setattr(_inference, "fit", lambda likelihood, model: SimpleNamespace(model=model))
+    monkeypatch.setattr(_inference, "fit_of", lambda state, best, _: SimpleNamespace(model=f"n{best.members[0]}"))
     monkeypatch.setattr(_inference, "State", lambda evidence, best, fit: fit)
     monkeypatch.setattr(
         _inference,
@@ -443,7 +442,7 @@ class _Judge:
 
         monkeypatch.setattr(_inference, "error_of", lambda sessions, model: self.errors.get(model.names, 0.5))
         monkeypatch.setattr(_inference, "LeftOut", Left)
-        monkeypatch.setattr(_inference, "with_members", lambda *given: self.model("a", "b"))
+        monkeypatch.setattr(_inference, "fit_of", lambda *given: SimpleNamespace(model=self.model("a", "b")))
         monkeypatch.setattr(
             _inference,
             "fit",

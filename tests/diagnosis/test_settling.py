@@ -85,8 +85,7 @@ def _ends(
         return fits[-1]
 
     monkeypatch.setattr(_settling, "_promising", lambda state: [None])
-    monkeypatch.setattr(_settling, "with_members", lambda *given: None)
-    monkeypatch.setattr(_settling, "fit", fitted)
+    monkeypatch.setattr(_settling, "fit_of", fitted)
     monkeypatch.setattr(_settling, "apart", lambda *given: apart)
     monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
     monkeypatch.setattr(_settling, "Evidence", weighed)
@@ -162,10 +161,9 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
     state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD)
     said: list[str] = []
     monkeypatch.setattr(_settling, "additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
-    monkeypatch.setattr(_settling, "with_members", lambda given, one, model, likelihood: one)
     monkeypatch.setattr(
-        _settling, "fit",
-        lambda likelihood, one: SimpleNamespace(cost=worth_of[one], model=SimpleNamespace(names=(one,))),
+        _settling, "fit_of",
+        lambda state, one, likelihood: SimpleNamespace(cost=worth_of[one], model=SimpleNamespace(names=(one,))),
     )  # fmt: skip
     monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: likely)
     monkeypatch.setattr(_settling, "state_at", lambda found: found.model.names)
@@ -339,10 +337,9 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
         )  # fmt: skip
 
     monkeypatch.setattr(_settling, "_promising", lambda state: sorted(evidence))
-    monkeypatch.setattr(_settling, "with_members", lambda given, one, model, likelihood: one)
     monkeypatch.setattr(_settling, "_strengths", lambda model: counts[model])
     monkeypatch.setattr(
-        _settling, "fit", lambda _, model, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
+        _settling, "fit_of", lambda _, model, __, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
     )
     monkeypatch.setattr(
         _settling,

@@ -400,7 +400,7 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
 
     monkeypatch.setattr(_inference, "error_of", lambda sessions, one: left[one.names])
     monkeypatch.setattr(_inference, "LeftOut", Left)
-    monkeypatch.setattr(_inference, "with_members", lambda *given: model("a", "b"))
+    monkeypatch.setattr(_inference, "fit_of", lambda *given: SimpleNamespace(model=model("a", "b")))
     monkeypatch.setattr(
         _inference, "fit", lambda _, one, *steps: SimpleNamespace(model=one, cost=costs.get(one.names, 9.0))
     )

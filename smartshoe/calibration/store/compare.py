@@ -232,8 +232,7 @@ def _extended(first: Calibration, second: Calibration, time_s: Array, load_n: Ar
 def _without_zero(calibration: Calibration) -> Calibration:
     if calibration.extended is None:
         return replace(calibration, offset=0.0)
-    bare = calibration.extended
-    for part in bare.parts:
-        if part.effect.shifts == "reading":
-            bare = bare.without(part.name)
-    return replace(calibration, extended=bare)
+    model = calibration.extended
+    return replace(
+        calibration, extended=model.without(*(one.name for one in model.parts if one.effect.shifts == "reading"))
+    )
