@@ -221,8 +221,15 @@ class _Prior:
 
     @classmethod
     def about(cls, model: ExtendedModel) -> _Prior:
+        """About where a shape begins, and where a flexible block's weight is null; all else is free."""
         logarithmic = _are_logarithmic(model)
-        return cls(logarithmic, _about(model, logarithmic), _precision(model, logarithmic))
+        centre, precision = _stepped(model.theta, logarithmic), np.zeros(logarithmic.size)
+        for k, (owner, parameter) in enumerate(model.parameters):
+            if parameter.prior_sd is not None:
+                centre[k], precision[k] = parameter.null or 0.0, 1.0 / parameter.prior_sd**2
+            elif parameter.null is None and owner != "baseline":
+                precision[k] = 1.0 if logarithmic[k] else 1.0 / parameter.size**2
+        return cls(logarithmic, centre, precision)
 
     def off(self, theta: Array) -> Array:
         """(p,) by how much ``theta`` lies off its centre, as it is stepped."""
@@ -231,26 +238,6 @@ class _Prior:
     def cost(self, model: ExtendedModel) -> float:
         """-2 log of its density but for a constant."""
         return float(np.sum(self.precision * self.off(model.theta) ** 2))
-
-
-def _about(model: ExtendedModel, logarithmic: Mask) -> Array:
-    """(p,) what the steps' prior is about: where a shape begins, where a flexible block's weight is null."""
-    about = _stepped(model.theta, logarithmic).copy()
-    for k, (_, parameter) in enumerate(model.parameters):
-        if parameter.prior_sd is not None:
-            about[k] = parameter.null or 0.0
-    return about
-
-
-def _precision(model: ExtendedModel, logarithmic: Mask) -> Array:
-    """(p,) of the steps' prior."""
-    precision = np.zeros(logarithmic.size)
-    for k, (owner, parameter) in enumerate(model.parameters):
-        if parameter.prior_sd is not None:
-            precision[k] = 1.0 / parameter.prior_sd**2
-        elif parameter.null is None and owner != "baseline":
-            precision[k] = 1.0 if logarithmic[k] else 1.0 / parameter.size**2
-    return precision
 
 
 def _stepped(theta: Array, logarithmic: Mask) -> Array:

@@ -15,11 +15,10 @@ from told_evidence import STANDARD, session_of
 from smartshoe.diagnosis._evidence import Evidence, _factor
 from smartshoe.diagnosis._likelihood import (
     Likelihood,
-    _about,
     _are_logarithmic,
     _bounded_step,
     _inverse,
-    _precision,
+    _Prior,
     _stepped,
     fit,
 )
@@ -113,10 +112,10 @@ def test_priors_are_about_where_a_shape_begins_and_where_a_weight_is_null() -> N
         ("block", _parameter(0.5, 0.0, 1.0, prior_sd=0.2)), ("block", _parameter(None, 1.0, 100.0, prior_sd=0.1)),
     ]  # fmt: skip
     model: Any = SimpleNamespace(parameters=parameters, theta=np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]))
-    logarithmic = np.array([True, False, True, False, False, False, True])
-    assert list(_precision(model, logarithmic)) == pytest.approx([0.0, 0.0, 1.0, 1.0 / 16.0, 0.0, 25.0, 100.0])
-    expected = [math.log(2.0), 3.0, math.log(4.0), 5.0, 6.0, 0.5, 0.0]
-    assert list(_about(model, logarithmic)) == pytest.approx(expected)
+    found = _Prior.about(model)
+    assert list(found.logarithmic) == [True, False, True, False, False, False, True]
+    assert list(found.precision) == pytest.approx([0.0, 0.0, 1.0, 1.0 / 16.0, 0.0, 25.0, 100.0])
+    assert list(found.centre) == pytest.approx([math.log(2.0), 3.0, math.log(4.0), 5.0, 6.0, 0.5, 0.0])
 
 
 # -- likelihoods ------------------------------------------------------------------------------------------------------
