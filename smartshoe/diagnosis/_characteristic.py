@@ -193,7 +193,7 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     else:
         middle = _slope(place, found.mean, inner)
         ends = 0.5 * (_slope(place, found.mean, upper) + _slope(place, found.mean, lower))
-        is_odd = all(_has_two_signs(one, thresholds) for one in (place, found.mean))
+        is_odd = all(has_two_signs(one, thresholds) for one in (place, found.mean))
         sign = -1.0 if middle < 0.0 and ends < 0.0 else 1.0
         shape = (
             f"{course} {'falls' if sign < 0 else 'rises'} by {sign * middle:.3g} {unit}/{of_load} about the middle and"
@@ -204,7 +204,7 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     return f"{shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"
 
 
-def _has_two_signs(values: Array, thresholds: Thresholds) -> bool:
+def has_two_signs(values: Array, thresholds: Thresholds) -> bool:
     """Whether values lie on both sides of none, and about as far."""
     low, high = float(values.min()), float(values.max())
     return low < 0.0 < high and min(-low, high) > thresholds.same * max(-low, high)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smartshoe.diagnosis._characteristic import characteristic_of
+from smartshoe.diagnosis._characteristic import characteristic_of, has_two_signs
 from smartshoe.diagnosis._procedure import diagnosed
 from smartshoe.diagnosis._result import Diagnosis
 from smartshoe.diagnosis._session import pastless
@@ -83,8 +83,8 @@ def diagnose(
 
 def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
     """Why a recording is none of a unit that is pressed, or None."""
-    low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
-    if not (low < 0 < high and min(-low, high) > thresholds.same * max(-low, high)):
+    low, high = ends = np.percentile(recording.force_n, [1, 99])
+    if not has_two_signs(ends, thresholds):
         return None
     return (
         f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"

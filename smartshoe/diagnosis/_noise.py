@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.signals.noise import autocovariance
 
 ROUNDING = 1e-9  # share of full scale: what it leaves where nothing else is left
 FLOOR = 1e-6  # share of full scale: no sensor is better, and less than that of noise leaves rounding to decide
@@ -25,8 +26,7 @@ def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
             continue
         signal = np.where(mask, residual - residual[mask].mean(), 0.0)
         size = int(mask.sum())
-        power = np.abs(np.fft.rfft(signal, 2 * signal.size)) ** 2
-        covariance = np.fft.irfft(power)[: signal.size]
+        covariance = autocovariance(signal)
         first = np.flatnonzero(covariance <= 0)
         until = int(first[0]) if first.size else signal.size
         square += float(signal @ signal)

@@ -47,9 +47,14 @@ def _innovations(values: Array, thresholds: Thresholds) -> Array:
     before = np.stack([shifted[few - 1 - k : shifted.size - 1 - k] for k in range(few)], axis=1)
     before = np.concatenate([before, np.ones((before.shape[0], 1))], axis=1)
     new = shifted[few:] - before @ np.linalg.lstsq(before, shifted[few:], rcond=None)[0]
-    ends = 0.5 * thresholds.faulty_share * np.array([1.0, -1.0]) + np.array([0.0, 1.0])
-    cut = np.clip(new, *np.quantile(new, ends))
+    cut = cut_short(new, thresholds)
     return np.asarray(cut - cut.mean())
+
+
+def cut_short(values: Array, thresholds: Thresholds) -> Array:
+    """(n,) ``values``, of which the largest and the smallest, a ``faulty_share`` together, are no farther out."""
+    ends = 0.5 * thresholds.faulty_share * np.array([1.0, -1.0]) + np.array([0.0, 1.0])
+    return np.asarray(np.clip(values, *np.quantile(values, ends)))
 
 
 def _correlated(load: Array, reading: Array) -> Array:

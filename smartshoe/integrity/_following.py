@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.integrity._answers import answered_s, binned
+from smartshoe.integrity._answers import answered_s, binned, cut_short
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
 from smartshoe.integrity._scales import five_point_median
@@ -151,10 +151,7 @@ def _beyond(signal: Array, columns: Array) -> Array:
 def _moves_with(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
     """Correlation of increments over ``stride`` points, less what chance gives so many; large ones cut short."""
     apart = min(max(1, round(stride)), load.size // 4)
-    d_load, d_reading = load[apart:] - load[:-apart], reading[apart:] - reading[:-apart]
-    ends = 0.5 * thresholds.faulty_share * np.array([1.0, -1.0]) + np.array([0.0, 1.0])
-    d_load = np.clip(d_load, *np.quantile(d_load, ends))
-    d_reading = np.clip(d_reading, *np.quantile(d_reading, ends))
+    d_load, d_reading = (cut_short(one[apart:] - one[:-apart], thresholds) for one in (load, reading))
     size = float(np.sqrt(np.dot(d_load, d_load) * np.dot(d_reading, d_reading)))
     if size == 0.0:
         return 0.0

@@ -16,13 +16,9 @@ ROUNDING = float(np.sqrt(np.finfo(float).eps))  # of a number: what differs by l
 
 def five_point_median(values: Array) -> Array:
     """(n,) running median of five; the ends repeat."""
-    v = np.concatenate([values[:1], values[:1], values, values[-1:], values[-1:]])
-    a, b, c, d, e = v[:-4], v[1:-3], v[2:-2], v[3:-1], v[4:]
-    # The median of five is the median of e and the two middle ones that pairs leave (six comparisons).
-    low_ab, high_ab = np.minimum(a, b), np.maximum(a, b)
-    low_de, high_de = np.minimum(d, e), np.maximum(d, e)
-    low, high = np.maximum(low_ab, low_de), np.minimum(high_ab, high_de)
-    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(values, 5, mode="nearest"))
 
 
 def local_scale(deviation: Array, thresholds: Thresholds, step: float = 0.0) -> Array:

@@ -71,6 +71,13 @@ def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None, ste
     return max(own, scale * float(np.sqrt(np.mean(within**2))))
 
 
+def autocovariance(rows: Array) -> Array:
+    """(n,) sums of the products of a series (n,) with itself at the lags 0 ... n - 1; of rows (m, n) all of theirs."""
+    n = rows.shape[-1]
+    power = np.abs(np.fft.rfft(np.atleast_2d(rows), 2 * n, axis=1)) ** 2
+    return np.asarray(np.fft.irfft(np.sum(power, axis=0), 2 * n)[:n])
+
+
 def _differences(signal: Array, order: int, share: int) -> Array:
     """Every ``share``-th difference of ``signal``."""
     count = -(-(signal.size - order) // share)

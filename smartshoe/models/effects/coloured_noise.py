@@ -13,6 +13,7 @@ from smartshoe.display import percent
 from smartshoe.models.effects._sensor_evidence import NoiseEffect, SensorEvidence, Waveformless
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.effects.exposure import by
+from smartshoe.signals.noise import autocovariance
 
 if TYPE_CHECKING:
     from smartshoe.signals.loading import Cycle
@@ -49,7 +50,7 @@ class ColouredNoise(Waveformless, NoiseEffect):
         covariance, pairs, lengths = np.zeros(0), np.zeros(0), []
         for series, bias, counted in _differences(residual, conditions, prediction):
             n = series.size
-            own = _autocovariance(series) + bias
+            own = autocovariance(series) + bias
             size = max(n, covariance.size)
             covariance = np.pad(covariance, (0, size - covariance.size)) + np.pad(own, (0, size - n))
             pairs = np.pad(pairs, (0, size - pairs.size)) + np.pad(counted, (0, size - n))
@@ -110,8 +111,8 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
         regressors = np.stack([np.ones(n), np.linspace(-1.0, 1.0, n), shape, np.gradient(shape)], axis=1)
         regressors *= counted[:, None]
         basis = np.linalg.qr(regressors)[0]
-        taken = np.sum([_autocovariance(column) for column in basis.T], axis=0)
-        pairs = _autocovariance(counted)
+        taken = np.sum([autocovariance(column) for column in basis.T], axis=0)
+        pairs = autocovariance(counted)
         repeats = len(starts)
         # Helmert's contrasts: as many independent series as repeats less one, each as noisy as a repeat.
         for row in range(1, repeats):
@@ -153,9 +154,3 @@ def _corners(shape: Array, noise: float) -> Array:
     bend = np.abs(np.diff(shape, 2, prepend=shape[0], append=shape[-1]))
     corner = bend > max(CORNER * noise, 6.0 * float(np.median(bend)))
     return np.asarray(np.minimum(np.convolve(corner, np.ones(7), mode="same"), 1.0))
-
-
-def _autocovariance(series: Array) -> Array:
-    """Sums (n,) of products at the lags 0 ... n - 1."""
-    n = series.size
-    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(series, 2 * n)) ** 2, 2 * n)[:n])
