@@ -32,7 +32,6 @@ class Excitation:
 
     rates_per_s: tuple[float, ...]
     peaks: tuple[float, ...]
-    repeats: int
     present: frozenset[str]
     thresholds: Thresholds
     is_judged: bool = True
@@ -125,13 +124,12 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     rested = [(_rested(one, thresholds), one.conditions.step_s) for one in sessions]
     rest_s = max((_longest_read_s(one, mask) for one, (mask, _) in zip(sessions, rested, strict=True)), default=0.0)
     # What a unit does while nothing presses it shows afterwards, also where nothing is read meanwhile.
-    idle_s = max((_longest(mask) * step_s for mask, step_s in rested), default=0.0)
+    idle_s = max((n * step_s for mask, step_s in rested for n in _runs(mask)), default=0.0)
     pauses = [n * step_s for mask, step_s in rested for n in _runs(_within(mask))]
     # Where a ramp begins and ends is smeared by its window, and found to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
-    repeats = _most_alike([(rise.rate, rise.peak) for rise in rated], thresholds.same)
     found = {
         "rates": len(rates) > 1,
         "peaks": len(peaks) > 1,
@@ -140,7 +138,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "rests": rest_s >= thresholds.settled_s,
         "idle": idle_s >= thresholds.idle_s,
         "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), thresholds.settled_s),
-        "repeats": repeats > 1,
+        "repeats": _most_alike([(rise.rate, rise.peak) for rise in rated], thresholds.same) > 1,
         "minor_loops": any(rise.is_minor for rise in rises),
         "shuffled_loads": len(peaks) > 1 and _are_shuffled(each, thresholds),
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
@@ -152,7 +150,6 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     return Excitation(
         tuple(rates),
         tuple(peaks),
-        repeats,
         present,
         thresholds,
         is_judged,
@@ -269,10 +266,6 @@ def _within(mask: Mask) -> Mask:
 def _runs(mask: Mask) -> list[int]:
     first, last = runs_of(mask)
     return [int(n) for n in last - first]
-
-
-def _longest(mask: Mask) -> int:
-    return max(_runs(mask), default=0)
 
 
 def _longest_read_s(session: Session, mask: Mask) -> float:

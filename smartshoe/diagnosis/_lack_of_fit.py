@@ -23,7 +23,7 @@ from scipy.special import stdtrit
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.signals.noise import NORMAL_QUARTILE
+from smartshoe.signals.noise import NORMAL_QUARTILE, autocovariance
 
 # Resolutions: half and twice of each changed no name in two cases.
 COLOURS = 5  # time constants of the noise's coloured part
@@ -35,8 +35,8 @@ class LackOfFit:
     """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
 
     ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks; ``variance_sd`` the standard
-    deviation of its variance under noise alone; ``share``: of the record, in which it looks. ``significant``: noise
-    that is known by so many hardly reaches it (Student's t).
+    deviation of its variance under noise alone. ``significant``: noise that is known by so many hardly reaches it
+    (Student's t).
     """
 
     rms: float
@@ -44,7 +44,6 @@ class LackOfFit:
     pairs: int
     thresholds: Thresholds
     variance_sd: float = math.inf
-    share: float = 1.0
 
     @property
     def significant(self) -> bool:
@@ -52,7 +51,7 @@ class LackOfFit:
 
     def would_show(self, rms: float) -> bool:
         """Whether structure of this ``rms`` would be significant: where it would not, none is no proof of noise."""
-        return self.pairs > 1 and self.share * rms**2 > self._largest_of_noise * self.variance_sd
+        return self.pairs > 1 and rms**2 > self._largest_of_noise * self.variance_sd
 
     @property
     def _largest_of_noise(self) -> float:
@@ -61,7 +60,7 @@ class LackOfFit:
 
 def repeating(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
     """Structure that repeats from cycle to cycle: its power in each kind of cycle, over the record."""
-    power = variance = covered = 0.0
+    power = variance = 0.0
     pairs = 0
     for rows, share in repeats(sessions, residuals, thresholds.cycle):
         count, places = rows.shape
@@ -69,18 +68,16 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
         # Over all pairs, products add up to the sum's square less the squares.
         mean = (float(np.sum(rows.sum(axis=0) ** 2)) - float(np.sum(rows**2))) / (2 * pair_count * places)
         # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
-        spectrum = np.sum(np.abs(np.fft.rfft(rows - rows.mean(axis=0), 2 * places, axis=1)) ** 2, axis=0)
-        auto = np.fft.irfft(spectrum, 2 * places)[:places] / (places * (count - 1))
+        auto = autocovariance(rows - rows.mean(axis=0)) / (places * (count - 1))
         fewer = 1 - np.arange(1, auto.size) / auto.size
         spread = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
         power += share * mean
         variance += share**2 * spread / pair_count
-        covered += share
         pairs += pair_count
     if not pairs:
         return LackOfFit(0.0, 0.0, 0, thresholds)
     sd = max(float(np.sqrt(variance)), 1e-300)
-    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / sd, pairs, thresholds, sd, covered)
+    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / sd, pairs, thresholds, sd)
 
 
 def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: float) -> list[tuple[Array, float]]:
@@ -219,8 +216,7 @@ def _mean_variance(centred: Array, step_s: float, thresholds: Thresholds) -> flo
     width = centred.shape[1]
     lags = np.arange(width // 2)
     rows = centred[_quiet(centred)]
-    power = np.sum(np.abs(np.fft.rfft(rows, 2 * width, axis=1)) ** 2, axis=0)
-    found = np.fft.irfft(power, 2 * width)[lags] / (rows.shape[0] * (width - lags))
+    found = autocovariance(rows)[lags] / (rows.shape[0] * (width - lags))
     white, of_mean = _centred(np.eye(1, width)[0])
     best: tuple[float, float] | None = None
     # A few of the slowest go into a block: what is slower counts as structure.

@@ -163,7 +163,7 @@ def bent_to_the_end_of(model: ExtendedModel) -> str | None:
     if not ended:
         return None
     return (
-        f"{listed([in_words(name) for name in ended], 'and')} has come to the end of its range: the unit bends farther"
+        f"{listed(ended, 'and')} has come to the end of its range: the unit bends farther"
         " than that equation can, and what it misses may stand in the names of other effects, which are half sure at"
         " most"
     )
@@ -194,17 +194,14 @@ def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds:
 def worse_of(won: Gain, beyond: str | None) -> str:
     """What is said of an extension whose gain `is_rejected`; ``beyond``: how loads there go beyond the fitted ones."""
     low, high = won.ci95
-    by = f"by {_percent(-high)} to {_percent(-low)} %" if won.is_certain else "which may be chance"
+    least, most = (percent(-0.01 * bound) for bound in (high, low))
+    by = f"by {least.removesuffix(' %')} to {most}" if won.is_certain else "which may be chance"
     why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
     return (
         f"on held-out data the extended model is worse than the baseline ({won.rmse_before:.4g} to"
         f" {won.rmse_after:.4g} {won.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
         " baseline's until such a recording is among those that are fitted"
     )
-
-
-def _percent(value: float) -> str:
-    return f"{value:,.0f}" if value >= 100.0 else f"{value:.2g}"
 
 
 def elsewhere_of(off: float, within: float, beyond: str | None) -> str:

@@ -285,7 +285,7 @@ def _next(
     found: Any = SimpleNamespace(
         fit=SimpleNamespace(model=MODEL), can_validate=can_validate, own_gains=own_gains, zero_changes=zero_changes
     )
-    excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
+    excitation = Excitation((0.1,), (1.0,), frozenset(), STANDARD)
     sessions: list[Any] = [
         SimpleNamespace(recording=pressed(triangles(), step_s=step_s)) for step_s in (0.05, 0.005, 0.1)
     ]

@@ -201,7 +201,7 @@ def test_loads_of_one_height_and_duration_that_go_by_other_courses_repeat_nothin
     for rows, _ in found:
         assert rows[1] == pytest.approx(rows[0])
     whole = repeating([_session(load, cycle)], [load], STANDARD)
-    assert (whole.pairs, whole.share) == (2, pytest.approx(sum(share for _, share in found)))
+    assert whole.pairs == 2
 
 
 def test_of_many_repeats_the_sums_are_those_over_all_pairs_in_memory_for_one_each() -> None:
@@ -252,9 +252,6 @@ def test_structure_would_show_where_its_variance_is_beyond_students_quantile_of_
     one = LackOfFit(0.0, 0.0, pairs, STANDARD, 1e-6)
     assert not one.would_show(0.999e-3 * bound**0.5)
     assert one.would_show(1.001e-3 * bound**0.5)
-    # What is looked for in a quarter of the record must be twice as large.
-    assert not replace(one, share=0.25).would_show(1.999e-3 * bound**0.5)
-    assert replace(one, share=0.25).would_show(2.001e-3 * bound**0.5)
     assert not replace(one, pairs=1).would_show(9.0)
     assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_show(9.0)
 

@@ -305,7 +305,7 @@ def _told(
         is_sure=is_sure,
         by=by,
     )
-    excitation = Excitation((0.1,), (1.0,), 1, present, STANDARD, channels=channels)
+    excitation = Excitation((0.1,), (1.0,), present, STANDARD, channels=channels)
     found: Any = SimpleNamespace(fit="fit", alone=alone)
     cause = cause_of(name, found, "fine", AFTER, SCALE, excitation, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]

@@ -161,7 +161,7 @@ def test_a_block_that_follows_what_no_law_does_is_said_and_not_named_but_by_a_la
 
 
 def test_a_memory_of_which_single_load_cycles_show_nothing_is_said_with_what_would_show_it() -> None:
-    once = Excitation((0.1, 0.5), (1.0,), 1, frozenset({"rates"}), STANDARD, is_cycled=False)
+    once = Excitation((0.1, 0.5), (1.0,), frozenset({"rates"}), STANDARD, is_cycled=False)
     told = str(not_shown_of(_named("permanent_set"), once))
     assert told.startswith(
         "permanent set fits, but recordings of one load cycle cannot show it, so that it is not named; it needs loads"
@@ -223,7 +223,7 @@ def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
     rejected = "it is rejected, so that model and calibration are the baseline's until"
     assert worse_of(won, None).startswith(f"{worse}: {alike}; {rejected}")
     far = replace(won, ci95=(-1234.0, -40.0))
-    assert "by 40 to 1,234 %" in worse_of(far, None)
+    assert "by 40 to 1234 %" in worse_of(far, None)
     assert "(0.7 to 1.1 mbar, which may be chance)" in worse_of(replace(won, is_certain=False), None)
 
 

@@ -82,7 +82,7 @@ def test_rates_peaks_and_repeats_are_those_of_the_rises() -> None:
     found = _shown(_course((2.0, 0.0), *RISE * 3, *((4.0, 0.5), (4.0, 0.0), (2.0, 0.0)) * 2))
     assert found.rates_per_s == pytest.approx([0.125, 0.5], rel=0.05)
     assert found.peaks == pytest.approx([0.5, 1.0], abs=0.04)
-    assert found.repeats == 3
+    assert "repeats" in found.present
     # A stray first ramp makes no second rate.
     many = _shown(_course((2.0, 0.0), (4.0, 1.0), (2.0, 0.0), (2.0, 0.0), *RISE * 8))
     assert many.rates_per_s == pytest.approx([0.5], rel=0.05)
@@ -94,7 +94,7 @@ def test_what_is_lacking_is_said_and_nothing_else() -> None:
     for words in ("one loading rate only", "no hold longer", "never seen at rest", "no load cycle is repeated"):
         assert words in said
     shown = frozenset({"holds", "rests", "repeats", "peaks", "shuffled_loads"})
-    rich = Excitation((0.1, 0.5), (0.5, 1.0), 3, shown, STANDARD)
+    rich = Excitation((0.1, 0.5), (0.5, 1.0), shown, STANDARD)
     assert rich.limits() == []
     assert len(replace(rich, peaks=(1.0,)).limits()) == 1
     assert "one peak load only" in replace(rich, peaks=(1.0,)).limits()[0]
@@ -133,7 +133,7 @@ def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None
 # -- what to run next ---------------------------------------------------------------------------------------------
 def _lacking(*words: str) -> Excitation:
     every = {"rates", "holds", "rests", "minor_loops", "peaks", "shuffled_loads", "pauses", "steps"}
-    return Excitation((0.1,), (1.0,), 1, frozenset(every - set(words)), STANDARD)
+    return Excitation((0.1,), (1.0,), frozenset(every - set(words)), STANDARD)
 
 
 @pytest.mark.parametrize(
