@@ -462,10 +462,9 @@ def _unexplained(made: Array, read: Array, known: Mask) -> Array:
 
 def _play(load: Array, width: Array) -> Array:
     """(n, widths) play operators of the load, each of one width."""
-    out = np.empty((load.size, width.size))
-    state = np.full(width.size, load[0])
-    low, high = load[:, None] - width, load[:, None] + width
-    for k in range(load.size):
-        state = np.minimum(np.maximum(state, low[k]), high[k])
-        out[k] = state
-    return out
+    from smartshoe.kernels.memory import NO_LOAD, backlash
+
+    out = np.empty((width.size, load.size))
+    for half_width, row in zip(width, out, strict=True):
+        backlash(load, half_width, np.array([NO_LOAD]), row)
+    return out.T
