@@ -46,43 +46,9 @@ def next_experiment(
     open_: bool,
     worse: bool = False,
 ) -> NextExperiment | None:
-    """What to do next, where anything is open; of a protocol how high and how fast it loads, beside the recordings."""
-    told = _next(found, causes, sessions, excitation, open_=open_, worse=worse)
-    if told is None or told.steps is None:
-        return told
-    return replace(told, says=f"{told.says}; {_loads_of(told.steps, sessions, excitation.thresholds)}")
+    """What to do next, where anything is open.
 
-
-def _loads_of(protocol: Protocol, sessions: Sequence[Session], thresholds: Thresholds) -> str:
-    """How high and how fast a protocol loads, and what it asks of a machine that was seen doing less."""
-    rate = protocol.peak_rate_n_per_s
-    asks = f"it loads to {rounded(protocol.peak_load_n)} N at up to {rounded(rate)} N/s"
-    recorded = max(_fastest_n_per_s(one.recording) for one in sessions)
-    if rate <= (1.0 + thresholds.same) * recorded:
-        return asks
-    return (
-        f"{asks}, faster than anything recorded (up to {rounded(recorded)} N/s): if the machine cannot, let its fast"
-        " ramps take longer, and expect it to tell less"
-    )
-
-
-def _fastest_n_per_s(recording: Recording) -> float:
-    """How fast a load was put on or taken off: over whole ramps, or by most of the way where they are in steps."""
-    time_s, load_n = recording.time_s, recording.force_n
-    by_way = (rate_range([(time_s, sign * load_n)])[1] for sign in (1.0, -1.0))
-    return max([*by_way, *(abs(one.rate_n_per_s) for one in ramps(time_s, load_n))])
-
-
-def _next(
-    found: Inference,
-    causes: Sequence[Cause],
-    sessions: Sequence[Session],
-    excitation: Excitation,
-    *,
-    open_: bool,
-    worse: bool,
-) -> NextExperiment | None:
-    """For the largest doubtful cause that any protocol tells from its nearest equivalent: the shortest such, a channel.
+    For the largest doubtful cause that any protocol tells from its nearest equivalent: the shortest such, a channel.
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
     Where neither parts any, but recordings have gains of their own, one of them again. Where they have not, and
@@ -99,7 +65,7 @@ def _next(
     for cause in sorted(doubtful, key=lambda one: -one.size):
         told.append(_told_apart(found, cause, sessions, excitation.thresholds))
         if told[-1].protocol:
-            return told[-1]
+            return _with_its_loads(told[-1], sessions, excitation.thresholds)
     if by_channel := [one for one in told if one.channel]:
         return by_channel[0]
     if found.own_gains or found.zero_changes:
@@ -113,8 +79,29 @@ def _next(
     least = excitation.thresholds.least_confidence
     is_unsure = any(cause.confidence < least or (cause.equivalents and cause.part is None) for cause in causes)
     if open_ or is_unsure:
-        return _unseen(found, pair, excitation)
+        return _with_its_loads(_unseen(found, pair, excitation), sessions, excitation.thresholds)
     return told[0] if told else None
+
+
+def _with_its_loads(told: NextExperiment, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
+    """Also how high and how fast its protocol loads, and what it asks of a machine that was seen doing less."""
+    if told.steps is None:
+        return told
+    rate, recorded = told.steps.peak_rate_n_per_s, max(_fastest_n_per_s(one.recording) for one in sessions)
+    asks = f"it loads to {rounded(told.steps.peak_load_n)} N at up to {rounded(rate)} N/s"
+    if rate > (1.0 + thresholds.same) * recorded:
+        asks += (
+            f", faster than anything recorded (up to {rounded(recorded)} N/s): if the machine cannot, let its fast"
+            " ramps take longer, and expect it to tell less"
+        )
+    return replace(told, says=f"{told.says}; {asks}")
+
+
+def _fastest_n_per_s(recording: Recording) -> float:
+    """How fast a load was put on or taken off: over whole ramps, or by most of the way where they are in steps."""
+    time_s, load_n = recording.time_s, recording.force_n
+    by_way = (rate_range([(time_s, sign * load_n)])[1] for sign in (1.0, -1.0))
+    return max([*by_way, *(abs(one.rate_n_per_s) for one in ramps(time_s, load_n))])
 
 
 def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:

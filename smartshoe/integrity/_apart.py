@@ -43,7 +43,7 @@ def apart_s(
     usable: Sequence[Mask],
     lags: Sequence[Lags],
     thresholds: Thresholds,
-    told: Told | None = None,
+    told: Told,
 ) -> dict[int, float]:
     """By place, how much later the reading of a recording follows than those of the others that are fitted.
 
@@ -51,7 +51,6 @@ def apart_s(
     be the late one: each is foretold by all others, on the clocks that are found by then. Then those of which one is
     told, and those that are not fitted, each by all before it that are fitted: its own lag is where to look from.
     """
-    told = told or Told({}, None, len(recordings))
     of_use = [place for place, mask in enumerate(usable) if mask.sum() >= thresholds.least_samples]
     fitted = [place for place in of_use if place < told.fitted]
     if len(of_use) < 2 or not fitted:
