@@ -117,12 +117,16 @@ def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> 
 
     Not one of a crosshead or of the room.
     """
-    left = [index for index, role in enumerate(roles) if role != "load"]
-    if len(roles) != 2 or len(left) != 1 or roles[left[0]] != "auxiliary":
+    beside = {"length", "temperature"}
+    left = [
+        index
+        for index, (role, unit_) in enumerate(zip(roles, units, strict=True))
+        if role != "load" and not (role == "auxiliary" and unit_ is not None and unit_.quantity in beside)
+    ]
+    if len(left) != 1 or roles[left[0]] != "auxiliary":
         return None
     unit_ = units[left[0]]
-    is_sensors = unit_ is not None and unit_.quantity not in ("length", "temperature", "force", "time")
-    return left[0] if is_sensors else None
+    return left[0] if unit_ is not None and unit_.quantity not in ("force", "time") else None
 
 
 def split_column(column: str) -> tuple[str, Unit | None]:

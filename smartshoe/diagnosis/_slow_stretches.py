@@ -55,12 +55,13 @@ def too_slow_of(recording: Recording, usable: Mask, longest_s: float, thresholds
     time_s, step_s = recording.time_s, recording.sample_time_s
     at_s = np.arange(time_s[0], time_s[-1], step_s)
     good = usable & recording.sensor.present & recording.load.present
-    slow = spacing_of(time_s, at_s, longest_s, thresholds).too_slow(good)
+    spacing = spacing_of(time_s, at_s, longest_s, thresholds)
+    slow = spacing.too_slow(good)
     if not slow.any():
         return None
     first, last = (ends[place] for ends, place in zip(runs_of(slow), (0, -1), strict=True))
-    within = (time_s >= at_s[first]) & (time_s <= at_s[last - 1] + step_s)
-    apart_s = float(np.median(np.diff(time_s[within]))) if within.sum() > 1 else longest_s
+    after = spacing.after[slow]
+    apart_s = float(np.median(time_s[after] - time_s[after - 1]))
     return (
         f"{recording.label}: from {moment(float(at_s[first]))} to {moment(float(at_s[last - 1]))} s"
         f" {percent(float(slow.mean()))} of it is not used: samples are {apart_s:.3g} s apart there, and fits that"

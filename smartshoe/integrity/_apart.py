@@ -29,12 +29,14 @@ class Told:
     """What is known of the clocks before recordings are compared: ``own_s``, lags that are told, by place.
 
     ``shared``: the clock that all that are fitted go by, or None; lags are beside it. ``fitted``: how many, from the
-    first, foretell; all others are foretold only.
+    first, foretell; all others are foretold only. ``perhaps``: one that all may go by, if it tells as much as lags of
+    their own.
     """
 
     own_s: Mapping[int, float]
     shared: OneClock | None
     fitted: int
+    perhaps: OneClock | None = None
 
 
 @on_one_thread
@@ -69,6 +71,10 @@ def apart_s(
     told_last = sorted((k for k in runs if k in told.own_s), key=lambda k: abs(told.own_s[k]))
     first = [k for k in runs if k < told.fitted and k not in told.own_s]
     found = {} if told.shared else _of_first({place: runs[place] for place in first}, lags, thresholds)
+    if found and told.perhaps is not None:
+        moved = [runs[place].earlier(found.get(place, 0.0)) for place in first]
+        if _left([runs[place].on(told.perhaps) for place in first]) <= _left(moved):
+            found = {}
     known = [runs[place].earlier(found.get(place, 0.0)).products for place in first]
     later = [*(k for k in told_last if k < told.fitted), *(k for k in runs if k >= told.fitted)]
     for place in later:
@@ -183,6 +189,12 @@ def _later_s(run: _Run, others: Array, thresholds: Thresholds, own_s: float = 0.
 
     is_foretold = np.all(thresholds.clear * left(lag_s) <= left(0.0))
     return lag_s if is_foretold and abs(lag_s) > run.least_s else 0.0
+
+
+def _left(runs: Sequence[_Run]) -> float:
+    """Squares of what is read that all together do not foretell."""
+    products = np.sum([one.products for one in runs], axis=0)
+    return float(sum(np.sum(one.read**2) for one in runs) - products[:, -1] @ _weights(products))
 
 
 def _weights(products: Array) -> Array:

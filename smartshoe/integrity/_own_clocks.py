@@ -9,7 +9,7 @@ import numpy as np
 
 from smartshoe.arrays import Mask
 from smartshoe.integrity._apart import Told, apart_s
-from smartshoe.integrity._clocks import UNSEEN, Lags, one_clock
+from smartshoe.integrity._clocks import UNSEEN, Lags, clock_through, one_clock
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
@@ -63,7 +63,9 @@ def clocks_of(
         compared = {*fitted} | apart - drifting
         own_s = {place: (own_s.get(place) or alone[place].lags.middle_s) - beside_s[place] for place in apart}
     masks = [mask & (place in compared) for place, mask in enumerate(usable)]
-    found = apart_s(recordings, masks, [one.lags for one in alone], thresholds, Told(own_s, borne, count))
+    seen = [alone[place].lags for place in fitted if alone[place].lags.at_s.size]
+    told = Told(own_s, borne, count, clock_through(seen) if seen else None)
+    found = apart_s(recordings, masks, [one.lags for one in alone], thresholds, told)
     if borne is None and shared is not None:  # what parts slowly is farther apart the longer a recording lasts
         found = {place: by for place, by in found.items() if not _goes_by(shared, alone[place], thresholds)}
     others = {place for place in apart if place >= count and (place in found or alone[place].is_told)}

@@ -26,8 +26,13 @@ def coarse_step(values: Array, thresholds: Thresholds) -> float:
     step = reading.local_step
     if (step > 0.0).mean() < 1.0 - thresholds.same:
         return 0.0
-    usual = float(np.median(step[step > 0.0]))  # beyond what is often read the distance between neighbours is no step
+    usual = _usual(step)
     return 0.0 if _is_hidden(UNIFORM_SD * usual, reading) else usual
+
+
+def _usual(step: Array) -> float:
+    """The median: beyond what is often read the distance between neighbours is no step."""
+    return float(np.median(step[step > 0.0]))
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
@@ -41,7 +46,7 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         return
     if not _stands_while_load_moves(view, step):
         return
-    usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
+    usual = _usual(step)
     error = UNIFORM_SD * usual
     if error < view.thresholds.material * view.span or _is_hidden(error, view.reading):
         return

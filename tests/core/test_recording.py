@@ -162,6 +162,7 @@ def test_sample_rate_is_that_of_the_grid(count: int, step: float) -> None:
         ({"adc_counts": [1.0, 2.0]}, "sensor"),
         ({"crosshead_mm": [1.0, 2.0]}, "auxiliary"),
         ({"room_c": [1.0, 2.0]}, "auxiliary"),
+        ({"temperature_c": [20.0, 21.0], "crosshead_mm": [0.0, 1.0], "cell_v": [1.0, 2.0]}, "sensor"),
         ({"foil_ohm": [1.0, 2.0], "cell_v": [1.0, 2.0]}, "auxiliary"),
         ({"pressure_mbar": [1.0, 2.0], "foil_ohm": [1.0, 2.0]}, "auxiliary"),
     ],

@@ -35,6 +35,7 @@ def test_an_extension_that_is_worse_where_it_is_judged_is_not_adopted(
     assert any("; it is rejected" in said for said in told.limits) is is_rejected
     assert told.explained_percent == 0.0
     assert told.extended.structure_rms == pytest.approx(42.0 if is_rejected else 2.8)
+    assert parts.seen["not_explained_of"][0][0] is parts.kinds[0 if is_rejected else 1]  # of what is handed out
 
 
 def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what_was_fitted(

@@ -85,6 +85,17 @@ def test_half_a_recording_at_a_lower_rate_is_used_or_said_not_to_be(slower: int,
     assert "50 % of it is not used: samples are 0.5 s apart there" in said[0]
 
 
+def test_between_quick_stretches_the_slow_ones_are_as_far_apart_as_they_are() -> None:
+    """A cell that is logged ten times a second in each pulse, and every ten seconds while it rests."""
+    pulse, rest = np.arange(0.0, 40.0, 0.1), 40.0 + np.arange(0.0, 2000.0, 10.0)
+    time_s = np.concatenate([start + np.concatenate([pulse, rest]) for start in (0.0, 2040.0)])
+    load = np.where(np.fmod(time_s, 2040.0) < 40.0, 5.0, 0.0)
+    run = Recording.from_arrays(time_s=time_s, force_n=load, cell_v=3.0 + 0.1 * load)
+    said = too_slow_of(run, np.ones(len(run), dtype=bool), 0.35, STANDARD)
+    assert said is not None
+    assert "samples are 10 s apart there, and fits that follow its load need one in 0.35 s" in said
+
+
 def test_nothing_is_said_of_what_is_logged_evenly_or_shakes() -> None:
     run = _run(1, "even")
     usable = np.ones(len(run), dtype=bool)

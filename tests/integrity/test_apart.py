@@ -24,15 +24,17 @@ STANDARD = Thresholds()
 STEP_S = 0.01
 
 
-def _run(late_s: float, seed: int, *, sign: float = 1.0, noise: float = 0.1) -> Recording:
-    """Ramps of several rates; a third of the reading follows slowly."""
+def _run(
+    late_s: float, seed: int, *, sign: float = 1.0, noise: float = 0.1, rate: float = 0.0, cycles: int = 20
+) -> Recording:
+    """Ramps of several rates; a third of the reading follows slowly. It is late by ``late_s``, and ``rate`` s a s."""
     rng = np.random.default_rng(seed)
-    lasts_s = np.repeat(rng.uniform(0.3, 3.0, 20), 2)
+    lasts_s = np.repeat(rng.uniform(0.3, 3.0, cycles), 2)
     corners_s = np.concatenate([[0.0, 2.0], 2.0 + np.cumsum(lasts_s)])
-    loads = np.concatenate([[0.0, 0.0], np.ravel([[height, 0.0] for height in rng.uniform(0.5, 1.0, 20)])])
+    loads = np.concatenate([[0.0, 0.0], np.ravel([[height, 0.0] for height in rng.uniform(0.5, 1.0, cycles)])])
     time_s = np.arange(0.0, corners_s[-1] + 2.0, STEP_S)
     load = np.interp(time_s, corners_s, loads)
-    read = np.interp(time_s - late_s, corners_s, loads)
+    read = np.interp(time_s - late_s - rate * time_s, corners_s, loads)
     keep = np.exp(-STEP_S / 2.0)
     read = 0.7 * read + 0.3 * lfilter([1.0 - keep], [1.0, -keep], read)
     return Recording.from_arrays(
@@ -95,6 +97,18 @@ def test_nor_is_a_lag_that_does_not_foretell_far_better() -> None:
 def _late(recording: Recording, by_s: float) -> Recording:
     time_s, sensor = recording.time_s, recording.sensor
     return recording.with_channel(sensor.with_values(np.interp(time_s - by_s, time_s, sensor.with_nan())))
+
+
+def test_lags_of_one_pair_of_clocks_that_part_are_not_those_of_one_recording() -> None:
+    """The longer a recording, the later it is: moved by a lag of its own it is foretold no better than by the clock."""
+    rate = 0.002
+    runs = [_run(0.0, seed, rate=rate, cycles=cycles) for seed, cycles in enumerate((30, 6, 6, 6))]
+    of_its_own, by_the_clock = (Told({}, None, len(runs), clock) for clock in (None, OneClock(0.0, rate)))
+    masks, unseen = [one.sensor.present for one in runs], (UNSEEN,) * len(runs)
+    assert apart_s(runs, masks, unseen, STANDARD, of_its_own) == {0: pytest.approx(0.064, abs=0.01)}
+    assert apart_s(runs, masks, unseen, STANDARD, by_the_clock) == {}
+    late = [_run(0.15 if seed == 2 else 0.0, seed) for seed in range(4)]
+    assert list(apart_s(late, [one.sensor.present for one in late], unseen, STANDARD, by_the_clock)) == [2]
 
 
 @cache

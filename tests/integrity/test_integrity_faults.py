@@ -14,6 +14,7 @@ from test_integrity_clean import simulated
 from smartshoe import diagnose
 from smartshoe.integrity import Integrity, examine
 from smartshoe.integrity._hum import aliases
+from smartshoe.integrity._quantisation import _usual
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals.lags import lagged
@@ -265,6 +266,10 @@ def test_a_coarse_lattice_is_a_fault(protocol, seed, step_percent):
     assert said == pytest.approx(step, rel=1e-3)
     assert found.faults[0].error == pytest.approx(step / np.sqrt(12.0), rel=1e-3)
     assert found.usable[0].all()
+
+
+def test_the_way_from_one_plateau_to_the_next_is_no_step_of_a_lattice():
+    assert _usual(np.array([0.0, 7.0, 7.0, 7.5, 7.0, 120.0, 7.0, 300.0])) == 7.0
 
 
 @settings(max_examples=6)
