@@ -115,7 +115,7 @@ def _role_of(name: str, unit_: Unit) -> Role:
 def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> int | None:
     """The auxiliary channel that is the only one beside a load, if it states a unit of what a sensor gives.
 
-    Not one of a crosshead or of the room.
+    A crosshead's and the room's may stand beside it, and are none.
     """
     beside = {"length", "temperature"}
     left = [

@@ -92,8 +92,10 @@ def diagnosed(
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     outcome = _outcome(found, given, left, named, causes, won)
-    kept = left.before if won.is_rejected else left.after  # of what is handed out
-    verdict, rest = outcome.verdict, unexplained_of(causes, left.before, kept)
+    adopted = _Adopted(found.fit, extended, best, left.after)
+    if won.is_rejected:  # all that what is held out decides: no extension is adopted that is worse there
+        adopted = _Adopted(found.baseline, plain, baseline, left.before)
+    verdict, rest = outcome.verdict, unexplained_of(causes, left.before, adopted.left)
     of_held_out = left_where_judged(fine, left.off_after, thresholds)
     # No more is noise than is no structure, and than what was fitted holds beside its own: what a model does not
     # foresee elsewhere is none for that. What is white there is noise in any case.
@@ -106,9 +108,6 @@ def diagnosed(
     )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
-    adopted = _Adopted(found.fit, extended, best, kept)
-    if won.is_rejected:  # all that what is held out decides: no extension is adopted that is worse there
-        adopted = _Adopted(found.baseline, plain, baseline, kept)
     parameters, covariance = joint_parameters(adopted.fit, scale)
     force = compensation(fine, adopted.model, plain, thresholds)
     # What no compensator takes off, be it the room's warmth, is its zero's, on the mean of the recordings.

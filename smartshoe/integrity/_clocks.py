@@ -93,9 +93,12 @@ def align(view: View) -> tuple[View, Lags]:
     return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate), seen
 
 
-def clock_through(each: Sequence[Lags]) -> OneClock:
-    """One line through lags that are seen, in whichever recording (Theil 1950, Sen 1968)."""
-    at_s, lag_s = np.concatenate([one.at_s for one in each]), np.concatenate([one.lag_s for one in each])
+def clock_through(each: Sequence[Lags]) -> OneClock | None:
+    """One line through lags, in whichever recording (Theil 1950, Sen 1968); None where none is seen."""
+    there = [one for one in each if one.at_s.size]
+    if not there:
+        return None
+    at_s, lag_s = np.concatenate([one.at_s for one in there]), np.concatenate([one.lag_s for one in there])
     rate = _slope(at_s, lag_s)
     return OneClock(float(np.median(lag_s - rate * at_s)), rate)
 
@@ -106,11 +109,11 @@ def one_clock(each: Sequence[Lags], thresholds: Thresholds) -> OneClock | None:
     Slow or few movements tell no clock alone, and what is told alone differs by chance. One line through the lags of
     all recordings must leave none of them off by more than a share of the longest lag, nor most of the moments in any.
     """
-    there = [one for one in each if one.at_s.size]
-    if not there:
+    through, there = clock_through(each), [one for one in each if one.at_s.size]
+    if through is None:
         return None
     middle_s = np.array([one.middle_s for one in there])
-    for found in (OneClock(float(np.mean(middle_s)), 0.0), clock_through(there)):
+    for found in (OneClock(float(np.mean(middle_s)), 0.0), through):
         lines = [found.lag_s(one.at_s) for one in there]
         off = [one.lag_s - line for one, line in zip(there, lines, strict=True)]
         allowed = thresholds.same * float(np.max(np.abs([*middle_s, *np.concatenate(lines)])))

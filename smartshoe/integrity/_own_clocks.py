@@ -51,7 +51,8 @@ def clocks_of(
     """
     there = [place for place, mask in enumerate(usable) if mask.any()]
     fitted = [place for place in there if place < count]
-    shared = one_clock([alone[place].lags for place in fitted], thresholds)
+    seen = [alone[place].lags for place in fitted]
+    shared = one_clock(seen, thresholds)
     borne = shared if any(alone[place].is_told for place in fitted) else None
     beside_s = [0.0 if borne is None else float(borne.lag_s(np.array(0.5 * one.duration_s))) for one in recordings]
     own_s = {place: alone[place].offset_s for place in there if alone[place].offset_s}
@@ -63,8 +64,7 @@ def clocks_of(
         compared = {*fitted} | apart - drifting
         own_s = {place: (own_s.get(place) or alone[place].lags.middle_s) - beside_s[place] for place in apart}
     masks = [mask & (place in compared) for place, mask in enumerate(usable)]
-    seen = [alone[place].lags for place in fitted if alone[place].lags.at_s.size]
-    told = Told(own_s, borne, count, clock_through(seen) if seen else None)
+    told = Told(own_s, borne, count, clock_through(seen))
     found = apart_s(recordings, masks, [one.lags for one in alone], thresholds, told)
     if borne is None and shared is not None:  # what parts slowly is farther apart the longer a recording lasts
         found = {place: by for place, by in found.items() if not _goes_by(shared, alone[place], thresholds)}

@@ -23,16 +23,17 @@ def coarse_step(values: Array, thresholds: Thresholds) -> float:
     if not values.size:
         return 0.0
     reading = Signal(values, thresholds)
-    step = reading.local_step
-    if (step > 0.0).mean() < 1.0 - thresholds.same:
-        return 0.0
-    usual = _usual(step)
+    usual = _usual(reading.local_step, thresholds)
     return 0.0 if _is_hidden(UNIFORM_SD * usual, reading) else usual
 
 
-def _usual(step: Array) -> float:
-    """The median: beyond what is often read the distance between neighbours is no step."""
-    return float(np.median(step[step > 0.0]))
+def _usual(step: Array, thresholds: Thresholds) -> float:
+    """The median of steps (n,), 0 where too few readings lie on a grid.
+
+    Beyond what is often read the distance between neighbours is no step.
+    """
+    on_grid = step > 0.0
+    return float(np.median(step[on_grid])) if on_grid.mean() >= 1.0 - thresholds.same else 0.0
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
@@ -40,13 +41,9 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
 
     A grid adds an error. It is a fault where that is material, and no noise hides it.
     """
-    step = view.reading.local_step
-    on_grid = step > 0.0
-    if on_grid.mean() < 1.0 - view.thresholds.same or view.span == 0.0:
+    usual = _usual(view.reading.local_step, view.thresholds)
+    if usual == 0.0 or view.span == 0.0 or not _stands_while_load_moves(view):
         return
-    if not _stands_while_load_moves(view, step):
-        return
-    usual = _usual(step)
     error = UNIFORM_SD * usual
     if error < view.thresholds.material * view.span or _is_hidden(error, view.reading):
         return
@@ -69,8 +66,9 @@ def _is_hidden(error: float, reading: Signal) -> bool:
     return error < reading.thresholds.same * noise
 
 
-def _stands_while_load_moves(view: View, step: Array) -> bool:
+def _stands_while_load_moves(view: View) -> bool:
     """Whether a reading stays on a level while the load goes on; a noiseless reading of a load in steps does not."""
     starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
     moved = view.gain * np.abs(view.steady_load[stops] - view.steady_load[starts])
-    return int((moved > view.thresholds.same * step[starts]).sum()) >= view.thresholds.clear * view.thresholds.few
+    is_beyond = moved > view.thresholds.same * view.reading.local_step[starts]
+    return int(is_beyond.sum()) >= view.thresholds.clear * view.thresholds.few

@@ -15,6 +15,7 @@ from smartshoe import diagnose
 from smartshoe.integrity import Integrity, examine
 from smartshoe.integrity._hum import aliases
 from smartshoe.integrity._quantisation import _usual
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals.lags import lagged
@@ -269,7 +270,7 @@ def test_a_coarse_lattice_is_a_fault(protocol, seed, step_percent):
 
 
 def test_the_way_from_one_plateau_to_the_next_is_no_step_of_a_lattice():
-    assert _usual(np.array([0.0, 7.0, 7.0, 7.5, 7.0, 120.0, 7.0, 300.0])) == 7.0
+    assert _usual(np.array([0.0, 7.0, 7.0, 7.5, 7.0, 120.0, 7.0, 300.0]), Thresholds()) == 7.0
 
 
 @settings(max_examples=6)
