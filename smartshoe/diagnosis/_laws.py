@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
 from smartshoe.diagnosis._members import Alternative, Member, fit_with
-from smartshoe.diagnosis._search import SWAPS
+from smartshoe.diagnosis._search import RIVALS, SWAPS
 from smartshoe.diagnosis._sensitivity import Candidate, available
 from smartshoe.diagnosis._state import State, evidence_about, fit_of, state_at
 from smartshoe.models.effects import Effect, blocks
@@ -63,9 +63,12 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
             # is the likelier, and was taken out beside this one.
             law = next(c.effect for c in evidence.given.candidates if c.name == other.effect)
             tried.append(fit_with(law, one.without.model, found.likelihood, (other.shape or {},)))
-    if not tried:
+    has_curve = any(one.effect.is_memoryless for one in members)
+    if not (tried or has_curve):
         return
     about, own = evidence_about(found.model, evidence)
+    if has_curve:
+        tried = [*_with_a_branch_each(tried, about.given.candidates), *_with_another_curve(found, about, own)]
     changed = []
     for fitted in tried:
         if evidence_about(fitted.model, evidence, about.given)[1].score >= own.score:
@@ -74,6 +77,33 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
         if own.score - best.score >= evidence.odds:
             changed.append(State(anew, best, fitted))
     yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
+
+
+def _with_another_curve(found: Fit, about: Evidence, own: Posterior) -> list[Fit]:
+    """A fit with one more curve beside its own, of another branch, where the linearisation does not speak against it.
+
+    The search has one curve in a set: each bends for the other, which only fits of both can tell.
+    """
+    candidates = about.given.candidates
+    there = [candidates[m] for m in own.members]
+    slots, branches = {one.slot for one in there}, {one.branch for one in there}
+    shapes: dict[Effect, list[Mapping[str, float]]] = {}
+    for score, k, strengths in sorted(about.extensions(own.members), key=lambda extension: extension[0]):
+        one = candidates[k]
+        if score >= own.score or one.effect.is_flexible or (len(strengths) == 1 and not one.has_sign_of(strengths)):
+            continue
+        if one.slot in slots and one.branch not in branches:
+            shapes.setdefault(one.effect, []).append(one.shape)
+    return [fit_with(law, found.model, found.likelihood, few[:RIVALS]) for law, few in shapes.items()]
+
+
+def _with_a_branch_each(fits: Sequence[Fit], candidates: Sequence[Candidate]) -> Iterator[Fit]:
+    """Fits but for those in which a law in the place of one curve is of the branch of another."""
+    branches = {one.name: one.branch for one in candidates}
+    for one in fits:
+        taken = [branches[name] for name in one.model.names if name in branches]
+        if len({*taken}) == len(taken):
+            yield one
 
 
 def _nearest_of_another_kind(member: Member, model: ExtendedModel) -> Alternative | None:

@@ -78,7 +78,11 @@ class Member:
 def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Member, ...]:
     likelihood = extended.likelihood
     chosen, thresholds = [evidence.given.candidates[member] for member in best.members], evidence.thresholds
-    less = [fit(likelihood, _without(one.name, extended.model), FEW_STEPS) for one in chosen]
+    ended = [_is_ended(one.name, extended.model) for one in chosen]
+    less = [
+        fit(likelihood, _without(one.name, extended.model, is_ended=at_end), FEW_STEPS)
+        for one, at_end in zip(chosen, ended, strict=True)
+    ]
     whole = _left(likelihood, extended)
     added = np.array([_left(likelihood, one) - whole for one in less]).reshape(len(less), whole.size)
     inner = added @ added.T
@@ -90,9 +94,8 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
         is_there = sizes[k] > thresholds.imperfection
-        is_ended = bool(extended.model.part(one.name).kind_ends_at)
         shapes = _shapes_beside(best, member, evidence)
-        laws = _other_laws(one, less[k], extended, shapes, is_ended=is_ended) if is_there else ()
+        laws = _other_laws(one, less[k], extended, shapes, is_ended=ended[k]) if is_there else ()
         others = alternatives(evidence, best, member)
         rivals = [law for a in others if (law := _untold_law(a, one.effect, present)) is not None]
         made.append(
@@ -106,7 +109,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
-                is_ended,
+                ended[k],
                 tuple(_of_kind(law, less[k], extended) for law in rivals) if is_there else (),
                 extended.model.part(one.name).bends_too_little,
             )
@@ -123,10 +126,19 @@ def _is_any_curve(effect: Effect, is_ended: bool) -> bool:
     return effect.is_memoryless and (effect.is_flexible or is_ended)
 
 
-def _without(name: str, model: ExtendedModel) -> ExtendedModel:
-    """``model`` without an effect; without any curve where it is one that lies where its kind ends: it bends others."""
+def _is_ended(name: str, model: ExtendedModel) -> bool:
+    """Whether an effect lies where it turns into one of another kind; beside a curve no other curve of its kind does.
+
+    It would be a curve as any, and that is there itself.
+    """
     part = model.part(name)
-    if not (part.effect.is_memoryless and part.kind_ends_at):
+    of_its_kind = sum(one.effect.is_memoryless and one.effect.kind == part.effect.kind for one in model.parts)
+    return bool(part.kind_ends_at) and of_its_kind < 2
+
+
+def _without(name: str, model: ExtendedModel, *, is_ended: bool) -> ExtendedModel:
+    """``model`` without an effect; without any curve where it is one that lies where its kind ends: it bends others."""
+    if not (model.part(name).effect.is_memoryless and is_ended):
         return model.without(name)
     return model.without(*(one.name for one in model.parts if one.effect.is_memoryless))
 
@@ -151,7 +163,7 @@ def _other_laws(
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
     likelihood, of_curves = less.likelihood, _is_any_curve(one.effect, is_ended)
-    beside, found = _without(one.name, extended.model), []
+    beside, found = _without(one.name, extended.model, is_ended=is_ended), []
     for law in available(likelihood.sessions, likelihood.thresholds):
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if law.is_flexible or not is_other or law.name in (one.name, *less.model.names):

@@ -46,9 +46,14 @@ class Candidate:
         return self.effect.name
 
     @property
-    def slot(self) -> str:
-        """Of what there is one in a set: a law, or a flexible block in its place, of each branch of a family."""
+    def branch(self) -> str:
+        """Of what there is one in a unit: a law, or a flexible block in its place, of each branch of a family."""
         return (self.is_apart and self.effect.branch) or self.effect.kind
+
+    @property
+    def slot(self) -> str:
+        """Of what a search puts one in a set: of each branch, but of all curves one, since they bend for each other."""
+        return self.effect.kind if self.effect.is_memoryless else self.branch
 
     def start(self, strengths: Array) -> Array:
         """Parameter values (p,) with these changes of the strengths from null, within their bounds."""

@@ -71,10 +71,11 @@ def apart_s(
     told_last = sorted((k for k in runs if k in told.own_s), key=lambda k: abs(told.own_s[k]))
     first = [k for k in runs if k < told.fitted and k not in told.own_s]
     found = {} if told.shared else _of_first({place: runs[place] for place in first}, lags, thresholds)
-    if found and told.perhaps is not None:
+    if found:  # foretold at other loads than the others had: one unit must follow all of them better by these lags
         moved = [runs[place].earlier(found.get(place, 0.0)) for place in first]
-        if _left([runs[place].on(told.perhaps) for place in first]) <= _left(moved):
-            found = {}
+        for clock in (None, told.perhaps):
+            if _left([runs[place].on(clock) for place in first]) <= _left(moved):
+                found = {}
     known = [runs[place].earlier(found.get(place, 0.0)).products for place in first]
     later = [*(k for k in told_last if k < told.fitted), *(k for k in runs if k >= told.fitted)]
     for place in later:

@@ -13,7 +13,7 @@ from told_evidence import STANDARD
 from smartshoe.diagnosis import _arms, _laws, _settling
 from smartshoe.diagnosis._arms import arms_of, effect_count
 from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
-from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, likelier, with_laws
+from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, _with_a_branch_each, likelier, with_laws
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.models.effects import blocks, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -261,9 +261,17 @@ def _weighed(
     others = [Alternative(other, 1.0, shape={"at": 3.0}) for other in ("delay", "near", "dead_band", "gas_heat")]
     return SimpleNamespace(
         name=name, fall=100.0, departed=departed, laws=made, alternatives=(Alternative(None, nothing), *others),
-        without=SimpleNamespace(model=f"without {name}"), size=size, effect=SimpleNamespace(why_unnamed=""),
-        is_ended=is_ended,
+        without=SimpleNamespace(model=f"without {name}"), size=size, is_ended=is_ended,
+        effect=SimpleNamespace(why_unnamed="", is_memoryless=False),
     )  # fmt: skip
+
+
+def test_a_unit_has_one_curve_of_each_branch() -> None:
+    branches = {"wall_hardening": "static_curve", "contact_area": "static_curve", "saturation": "end of range"}
+    candidates: Any = [SimpleNamespace(name=name, branch=branch) for name, branch in branches.items()]
+    sets = [("wall_hardening", "saturation", "zero_offset"), ("wall_hardening", "contact_area"), ("contact_area",)]
+    fits: Any = [SimpleNamespace(model=SimpleNamespace(names=names)) for names in sets]
+    assert [one.model.names for one in _with_a_branch_each(fits, candidates)] == [sets[0], sets[2]]
 
 
 def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(monkeypatch: pytest.MonkeyPatch) -> None:

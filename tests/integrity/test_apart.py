@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -79,6 +80,34 @@ def test_what_all_recordings_share_and_what_a_logger_delays_is_of_no_clock() -> 
     assert _apart(_run(0.0, 1), _run(0.03, 2)) == {}
     assert _apart(_run(0.1, 1)) == {}
     assert _apart(_run(0.0, 1), _run(0.1, 2).taken(slice(0, 50))) == {}
+
+
+def _ends_softly(share: Array) -> Array:
+    return np.asarray(share / (1.0 + np.abs(share / 0.92) ** 30) ** (1.0 / 30.0))
+
+
+def _begins_late(share: Array) -> Array:
+    return np.asarray(np.maximum(share - 0.06, 0.0) ** 1.3)
+
+
+def _bent(corners_s: list[float], loads: list[float], curve: Callable[[Array], Array], name: str) -> Recording:
+    """A line between corners at 500 Hz, of which a third follows within a tenth of a second, behind a curve."""
+    time_s = np.arange(0.0, corners_s[-1] + 1.0, 0.002)
+    load = np.interp(time_s, corners_s, loads)
+    keep = np.exp(-0.002 / 0.1)
+    read = 100.0 * curve(0.7 * load + 0.3 * lfilter([1.0 - keep], [1.0, -keep], load))
+    noisy = read + 0.02 * np.random.default_rng(len(name)).standard_normal(load.size)
+    return Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=noisy, name=name)
+
+
+@pytest.mark.parametrize("curve", [_ends_softly, _begins_late])
+def test_two_recordings_of_a_bent_unit_have_one_clock(curve: Callable[[Array], Array]) -> None:
+    """What slow ramps foretell of quick steps is late where a curve bends: one unit follows both best without a lag."""
+    lasts_s = np.repeat([5.0, 2.5], 6)
+    ramps = _bent([0.0, 1.0, *(1.0 + np.cumsum(lasts_s))], [0.0, 0.0, *[1.0, 0.0] * 6], curve, "ramps")
+    levels = np.repeat([0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0], 2)
+    steps = _bent([0.0, 1.0, *(1.0 + np.cumsum([0.1, 2.0] * 8))], [0.0, 0.0, *levels], curve, "steps")
+    assert _apart(ramps, steps) == {}
 
 
 def test_loads_of_a_few_percent_about_one_that_stands_tell_as_much() -> None:

@@ -27,6 +27,7 @@ class Saturation(Effect):
     """
 
     name, family, stage, place = "saturation", "saturation", "sensor", "logger"
+    branch = "end of range"
     is_memoryless = True
     imitates = "static_curve"  # without ties at a rail it is a curve among curves
     says = "readings flatten near the largest one (or at zero) however the load goes on"
