@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import MappingProxyType
 
 import numpy as np
@@ -80,15 +81,13 @@ class ExtendedCompensator(ForceFilter):
         if inverse is None:
             self._passed_over[part.name] = _why_not(part)
             return
+        if isinstance(inverse, Memoryless) and math.isfinite(part.until_s):
+            inverse = inverse.until(part.until_s)
         self._blocks.append((part.name, inverse))
         moved = _moved_by_the_clock(inverse, self.started_s)
         if moved:
             self._moved[part.name] = moved
-            self._cautions[part.name] = (
-                "it goes on with the clock from the first reading on, however short the recordings were that it was"
-                f" fitted to: an hour later it moves a full-scale force by {significant(100.0 * moved, 2)} %; reset the"
-                " filter where a session begins"
-            )
+            self._cautions[part.name] = _going_on(part, moved)
         if not part.effect.is_latency:
             return
         raised = noise_gain(inverse)
@@ -158,6 +157,20 @@ def _moved_by_the_clock(inverse: Inverse, started_s: float) -> float:
         return 0.0
     first, last = inverse.push(np.ones(2), np.array([started_s, started_s + HOUR_S])).tolist()
     return float(last - first)
+
+
+def _going_on(part: Part, moved: float) -> str:
+    """What a drift asks of whoever uses the filter; ``moved``: that of `_moved_by_the_clock`."""
+    by = f"moves a full-scale force by {significant(100.0 * moved, 2)} %"
+    if math.isfinite(part.until_s):
+        return (
+            f"it goes with the clock from the first reading on until {part.until_s:.4g} s, the end of what it was"
+            f" fitted to, and is held from then on, where it {by}; reset the filter where a session begins"
+        )
+    return (
+        "it goes on with the clock from the first reading on, however short the recordings were that it was fitted to:"
+        f" an hour later it {by}; reset the filter where a session begins"
+    )
 
 
 def _why_not(part: Part) -> str:

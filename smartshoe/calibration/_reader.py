@@ -115,6 +115,11 @@ class Reader:
                 )
             for parameter in self.mapping(effects, name, f"{key}.effects."):
                 self.number(effects[name], parameter, above)
+        if "held_after_s" in given:
+            held = self.mapping(given, "held_after_s", f"{key}.")
+            for name in held:
+                if name not in effects or self.number(held, name, f"{key}.held_after_s.") < 0.0:
+                    raise self.fault(f"{key}.held_after_s.{name}", "is no time, from 0, of one of the effects")
         try:
             model = ExtendedModel.from_dict(given)
         except KeyError as error:

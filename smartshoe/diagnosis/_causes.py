@@ -33,7 +33,8 @@ def cause_of(
     """The cause of a ``name`` in what was ``found``; ``best``: held-out errors of the extended model, in ``fine``."""
     member = name.member
     law = name.by or next((a for a in member.laws if a.effect == name.effect.name), None)
-    won = gain(errors(fine, member.without.model), best, scale, thresholds)
+    without = member.without.model.held_as(found.fit.model)
+    won = gain(errors(fine, without), best, scale, thresholds)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
         _without_it(name),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -171,19 +171,18 @@ def late_of(found: Compensation) -> list[str]:
     ]
 
 
-def going_on_of(found: Compensation, named: Collection[str], thresholds: Thresholds) -> list[str]:
-    """What is said of effects that are not ``named`` and that a calibration takes off by the clock, on and on."""
-    said = [
-        f"{in_words(name)} by {percent(share, signed=True)}"
-        for name, share in found.filter.moved_in_an_hour.items()
-        if name not in named and abs(share) > thresholds.standing
-    ]
-    if not said:
+def held_of(found: Compensation, thresholds: Thresholds) -> list[str]:
+    """What is said of drifts that a calibration holds as they are at the end of what was fitted."""
+    moved = found.filter.moved_in_an_hour
+    held = [part for part in found.model.parts if math.isfinite(part.until_s)]
+    held = [part for part in held if abs(moved.get(part.name, 0.0)) > thresholds.standing]
+    if not held:
         return []
+    said = ", ".join(f"{in_words(part.name)} by {percent(moved[part.name], signed=True)}" for part in held)
     return [
-        "the calibration takes off by the clock what has no name here, and goes on with it: an hour on, beyond all that"
-        f" was recorded, it moves a full-scale force ({', '.join(said)}); reset it where a session begins, and fit a"
-        " recording as long as its sessions are to be"
+        f"the calibration takes off by the clock what no law is named for, up to {held[0].until_s:.4g} s, the end of"
+        f" what was fitted, and holds it from then on, since nothing tells how it goes on: there it moves a full-scale"
+        f" force ({said}); reset it where a session begins, and fit a recording as long as its sessions are to be"
     ]
 
 

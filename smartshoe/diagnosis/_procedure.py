@@ -16,7 +16,7 @@ from smartshoe.diagnosis._force import (
     clipped_of,
     compensation,
     force_of,
-    going_on_of,
+    held_of,
     late_of,
     not_undone_of,
 )
@@ -46,7 +46,7 @@ from smartshoe.diagnosis._ranges import beyond
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
@@ -81,10 +81,14 @@ def diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     left = _left_by(found, given, integrity.faults)
+    named = _named(found, given, left)
+    held = _held(found.fit.model, named, sessions)
+    if held is not found.fit.model:
+        found = replace(found, fit=replace(found.fit, model=held))
+        left = _left_by(found, given, integrity.faults)
     plain = replace(found.baseline.model, noise=fitted_rms(fine, left.off_before))
     extended = replace(found.fit.model, noise=fitted_rms(fine, left.off_after))
     baseline, best = errors(fine, plain), errors(fine, extended)
-    named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
     is_told = found.zero_changes or found.own_gains or given.is_no_unit
     apart = None if is_told else own_zeros(sessions, found.fit.model, thresholds)
@@ -211,6 +215,15 @@ def _named(found: Inference, given: Prepared, left: _LeftOver) -> Chosen:
     return causes_among(found, given, zeros, most)
 
 
+def _held(model: ExtendedModel, named: Chosen, sessions: Sequence[Session]) -> ExtendedModel:
+    """``model`` with drifts that are no ``named`` law held from the end of what was fitted on: beyond it nothing tells.
+
+    A free form is none either, whatever its kind is named.
+    """
+    ends_s = [one.conditions.before.get("time_s", 0.0) + one.conditions.time_s[-1] for one in fitted_of(sessions)]
+    return model.held_after(float(max(ends_s)), {name.effect.name for name in named.names})
+
+
 @dataclass(frozen=True, slots=True)
 class _Outcome:
     """The verdict, by what was ``won``, what is ``elsewhere`` (`off_elsewhere`) and ``unproven``.
@@ -268,7 +281,6 @@ def _limits_of_the_force(
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
     undone = extended if force.is_plain else force.model
-    of_causes = {one.member.name for one in named.names}
     return (
         *([worse_of(won, ways)] if won.is_rejected else []),
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
@@ -276,7 +288,7 @@ def _limits_of_the_force(
         *clipped_of(force),
         *late_of(force),
         *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
-        *([] if force.is_plain else going_on_of(force, of_causes, thresholds)),
+        *([] if force.is_plain else held_of(force, thresholds)),
         *named.of_zeros,
         *own_gains_of(found.own_gains),
         *own_zeros_of(apart, given.scale),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -26,10 +27,14 @@ DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """An effect in a model, with the values of its parameters."""
+    """An effect in a model, with the values of its parameters.
+
+    ``until_s``: seconds since a session began from which on it stays as it is by then, where it goes with the clock.
+    """
 
     effect: Effect
     values: Array
+    until_s: float = math.inf
 
     @property
     def name(self) -> str:
@@ -100,7 +105,7 @@ class ExtendedModel:
         parts, k = [], len(BASELINE)
         for part in self.parts:
             count = len(part.effect.parameters)
-            parts.append(Part(part.effect, np.array(theta[k : k + count], dtype=float)))
+            parts.append(replace(part, values=np.array(theta[k : k + count], dtype=float)))
             k += count
         gain, share, rate = (float(value) for value in theta[: len(BASELINE)])
         return replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
@@ -119,6 +124,22 @@ class ExtendedModel:
         """This model without the named effects; itself where it has none of them."""
         kept = tuple(part for part in self.parts if part.name not in names)
         return replace(self, parts=kept) if len(kept) < len(self.parts) else self
+
+    def held_after(self, last_s: float, but: Collection[str]) -> ExtendedModel:
+        """This model with its drifts, ``but`` for these, as they are ``last_s`` into a session from then on.
+
+        Itself where there are none to hold.
+        """
+        held = {part.name for part in self.parts if part.effect.is_drift and part.name not in but}
+        parts = (replace(part, until_s=last_s) if part.name in held else part for part in self.parts)
+        return replace(self, parts=tuple(parts)) if held else self
+
+    def held_as(self, other: ExtendedModel) -> ExtendedModel:
+        """This model with the drifts that it shares with another held when they are there."""
+        until_s = {part.name: part.until_s for part in other.parts}
+        return replace(
+            self, parts=tuple(replace(part, until_s=until_s.get(part.name, part.until_s)) for part in self.parts)
+        )
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -163,7 +184,7 @@ class ExtendedModel:
             if part is None:
                 signal = _through(core or self.core, signal, conditions)
             else:
-                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
+                given = self._around(conditions) if part.effect.bends_beside_arm else conditions.until(part.until_s)
                 signal = part.effect.apply(signal, given, part.values)
                 refuse_other_size(part.name, signal, conditions.load.size)
         return self.gain * signal
@@ -253,7 +274,8 @@ class ExtendedModel:
 
     # -- to and from a file ---------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
-        """The model for a calibration file."""
+        """The model for a calibration file; ``held_after_s`` is in it only where drifts are held."""
+        held = {part.name: part.until_s for part in self.parts if math.isfinite(part.until_s)}
         return {
             "gain": self.gain,
             "relaxing_share": self.relaxing_share,
@@ -264,17 +286,19 @@ class ExtendedModel:
             "wall_ratio": self.wall_ratio,
             "noise": self.noise,
             "effects": {part.name: {parameter.name: value for parameter, value in part.valued} for part in self.parts},
+            **({"held_after_s": held} if held else {}),
         }
 
     @classmethod
     def from_dict(cls, given: Mapping[str, Any]) -> ExtendedModel:
         """The model that `to_dict` described; raises `UsageError` for an effect that is not known, `KeyError`."""
-        parts = [(effect(name), values) for name, values in given["effects"].items()]
-        plain = {key: given[key] for key in given if key != "effects"}
-        return cls(
-            **plain,
-            parts=tuple(Part(one, np.array([_stored(p, values) for p in one.parameters])) for one, values in parts),
-        )
+        held = given.get("held_after_s", {})
+        plain = {key: given[key] for key in given if key not in ("effects", "held_after_s")}
+        parts = []
+        for name, values in given["effects"].items():
+            stored = np.array([_stored(p, values) for p in effect(name).parameters])
+            parts.append(Part(effect(name), stored, held.get(name, math.inf)))
+        return cls(**plain, parts=tuple(parts))
 
 
 def _through(core: Core, signal: Array, conditions: Conditions) -> Array:

@@ -16,6 +16,7 @@ NEARLY = frozenset({
     *LOOPED,
 })  # fmt: skip
 """Effects whose inverse is not exact everywhere: each has a test of its own."""
+DRIFTS = ["gain_drift", "zero_drift", "warm_up", "flexible_gain_drift"]
 
 
 def invertible() -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,6 +66,14 @@ def test_the_file_adds_keys_only_where_they_are_needed() -> None:
     assert set(CALIBRATION.to_dict()["extended"]["effects"]) == set(NAMES)
 
 
+def test_a_file_says_when_drifts_are_held(tmp_path: Path) -> None:
+    model = chain_of(["zero_drift", "gain_drift"], 3).held_after(300.0, ("gain_drift",))
+    extended_calibration(model).save(tmp_path / "c.json")
+    back = Calibration.load(tmp_path / "c.json").model()
+    assert [back.part(name).until_s for name in ("zero_drift", "gain_drift")] == [300.0, math.inf]
+    assert "held_after_s" not in chain_of(["zero_drift"], 3).to_dict()
+
+
 def test_a_twin_simulates_and_does_not_compensate(tmp_path: Path) -> None:
     twin = chain_of(["play_hysteresis", "second_relaxation"], 3)
     calibration = replace(CALIBRATION, twin=twin)
@@ -120,6 +129,9 @@ def test_the_linear_part_is_the_papers_equation_13(gain: float, share: float, ra
         ({"effects": {"no_such_effect": {}}}, "no_such_effect"),
         ({"effects": {"linear_leak": {}}}, "leak_rate"),
         ({"effects": {"linear_leak": {"leak_rate": 0.1, "more": 1.0}}}, "extended.effects.linear_leak.more"),
+        ({"held_after_s": []}, "extended.held_after_s"),
+        ({"held_after_s": {"zero_drift": "x"}}, "extended.held_after_s.zero_drift"),
+        ({"held_after_s": {NAMES[0]: -1.0}}, f"extended.held_after_s.{NAMES[0]}"),
         ({"effects": {"linear_leak": {"leak_rate": "x"}}}, "extended.effects.linear_leak.leak_rate"),
     ],
 )

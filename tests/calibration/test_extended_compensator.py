@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from chains import BASELINE, EXACT, INVERTIBLE, LOOPED, chain_of, some_conditions, typical
+from chains import BASELINE, DRIFTS, EXACT, INVERTIBLE, LOOPED, chain_of, some_conditions, typical
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -276,7 +276,7 @@ def test_the_bilinear_form_is_the_papers_filter(share: float, rate: float, seed:
     np.testing.assert_allclose(coarse.apply(readings), paper.apply(readings), rtol=1e-8, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["gain_drift", "zero_drift", "warm_up", "flexible_gain_drift"])
+@pytest.mark.parametrize("name", DRIFTS)
 def test_what_goes_on_with_the_clock_says_how_far_it_goes_within_an_hour(name: str) -> None:
     model = BASELINE.with_part(effect(name), effect(name).begun())
     filter_ = ExtendedCompensator(model, 1.0)
@@ -286,6 +286,34 @@ def test_what_goes_on_with_the_clock_says_how_far_it_goes_within_an_hour(name: s
     moved = 100.0 * (force_n[-1] - force_n[0]) / model.full_scale_load_n
     assert float(said[1].replace("−", "-")) == pytest.approx(moved, rel=0.05)
     assert not ExtendedCompensator(BASELINE.with_part(effect("contact_area"), [0.1, 0.5])).cautions
+
+
+@pytest.mark.parametrize("name", DRIFTS)
+def test_a_drift_that_is_held_is_undone_as_its_twin_simulates_it(name: str) -> None:
+    model = BASELINE.with_part(effect(name), effect(name).begun()).held_after(4.0, ())
+    conditions = some_conditions(3)
+    assert conditions.time_s[-1] > 20.0
+    assert np.max(np.abs(_error(model, conditions))) < EXACT_TOLERANCE
+    filter_ = ExtendedCompensator(model, 1.0)
+    force_n = filter_.apply(np.full(3601, filter_.reading_per_share))
+    assert np.ptp(force_n[200:]) < 1e-6 < abs(force_n[-1] - force_n[0])  # once the wall has followed
+    moved = 100.0 * (force_n[-1] - force_n[0]) / model.full_scale_load_n
+    said = re.search(r"until 4 s, .* where it moves a full-scale force by (\S+) %", filter_.cautions[name])
+    assert said is not None
+    assert float(said[1].replace("−", "-")) == pytest.approx(moved, rel=0.05)
+
+
+def test_what_is_held_is_a_drift_and_stays_held() -> None:
+    model = chain_of(["zero_drift", "gain_drift", "linear_leak"], 1)
+    held = model.held_after(4.0, ("gain_drift",))
+    assert {part.name: part.until_s for part in held.at(held.theta).parts} == {
+        "zero_drift": 4.0, "gain_drift": np.inf, "linear_leak": np.inf,
+    }  # fmt: skip
+    assert model.held_as(held).part("zero_drift").until_s == 4.0
+    assert model.held_after(4.0, ("gain_drift", "zero_drift")) is model
+    carried_on = Conditions(np.arange(5.0), np.zeros(5), 1.0, before={"time_s": 2.0})
+    assert carried_on.until(4.0).time_s.tolist() == [0.0, 1.0, 2.0, 2.0, 2.0]
+    assert carried_on.until(6.0) is carried_on
 
 
 def test_a_leak_says_that_an_error_of_zero_grows() -> None:

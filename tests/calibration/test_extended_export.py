@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_code import needs_compiler, run_filters
-from chains import EXACT, INVERTIBLE, chain_of, some_conditions
+from chains import DRIFTS, EXACT, INVERTIBLE, chain_of, some_conditions
 from export_page import require_stated
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -76,6 +76,18 @@ def test_the_self_test_passes_for_any_chain_and_name(names: list[str], seed: int
         write_files(export_files(extended_calibration(chain_of(names, seed), unit=text + "*//"), "c"), name)
         done = _self_test(Path(name))
     assert done.returncode == 0, done.stdout
+
+
+@needs_compiler
+@pytest.mark.parametrize(("precision", "most"), [("double", 1e-12), ("float", 1e-5)])
+def test_drifts_that_are_held_are_so_in_c(precision: str, most: float, tmp_path: Path) -> None:
+    calibration = extended_calibration(chain_of(DRIFTS, 11).held_after(20.0, ()))
+    readings = _readings(calibration.model(), 5).astype(np.float32).astype(float)
+    expected_n = calibration.compensator().apply(readings)
+    forces_n = _run_c(calibration, readings, tmp_path, precision)
+    assert np.max(np.abs(forces_n - expected_n)) <= most * np.max(np.abs(expected_n))
+    going_on_n = extended_calibration(chain_of(DRIFTS, 11)).compensator().apply(readings)
+    assert np.max(np.abs(going_on_n - expected_n)) > 100.0 * most * np.max(np.abs(expected_n))
 
 
 @needs_compiler

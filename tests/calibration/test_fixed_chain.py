@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_code import ARM, CORES, compiled, macro, needs_arm, needs_compiler, run_filters
-from chains import BASELINE, INVERTIBLE, chain_of, some_conditions
+from chains import BASELINE, DRIFTS, INVERTIBLE, chain_of, some_conditions
 from export_page import require_stated, stated
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -79,6 +79,12 @@ def test_chains_in_16_bits_keep_their_bounds(tmp_path: Path) -> None:
     }
     calibrations = {unit: extended_calibration(chain_of(names, 2), unit=unit) for unit, names in chains.items()}
     print(_require_bounds(calibrations, "q15", tmp_path))
+
+
+@needs_compiler
+def test_drifts_that_are_held_are_so_in_integers(tmp_path: Path) -> None:
+    held = {name: chain_of([name], 11).held_after(20.0, ()) for name in DRIFTS}
+    _require_bounds({name: extended_calibration(one, unit=name) for name, one in held.items()}, "q31", tmp_path)
 
 
 @needs_compiler

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from test_diagnosis_parts import MODEL, recording, sessions_of
+from told_diagnosis import name_of
 
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis import Thresholds, _force
@@ -18,10 +22,11 @@ from smartshoe.diagnosis._force import (
     compensation,
     force_error,
     force_of,
-    going_on_of,
+    held_of,
     late_of,
     not_undone_of,
 )
+from smartshoe.diagnosis._procedure import _held
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import mean_offset
 from smartshoe.models.effects import effect
@@ -138,21 +143,43 @@ def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
     assert not_undone_of(late.without("delay"), 0.02) == []
 
 
-def test_what_has_no_name_and_is_taken_off_by_the_clock_is_said_to_go_on(one: Session) -> None:
-    """0.00002 of full scale a second is 7.2 % in an hour, through the gain that follows it."""
-    drift = np.array([2e-5, 0.0, 0.0, 1.0])
+def test_a_drift_that_is_held_is_said_to_be(one: Session) -> None:
+    """0.0002 of full scale a second is 4 % in 200 s, through the gain that follows it."""
+    drift = np.array([2e-4, 0.0, 0.0, 1.0])
     drifting = MODEL.with_part("zero_drift", drift)
 
-    def told(model: ExtendedModel, *named: str) -> list[str]:
+    def told(model: ExtendedModel) -> list[str]:
         nothing = ForceError(0.0, 0.0)
         undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
-        return going_on_of(Compensation([one], model, nothing, nothing, nothing, undone_by), named, STANDARD)
+        return held_of(Compensation([one], model, nothing, nothing, nothing, undone_by), STANDARD)
 
-    (said,) = told(drifting)
-    assert "(zero drift by -7.2 %)" in said
-    assert told(drifting, "zero_drift") == []  # a cause is told as one
-    assert told(MODEL.with_part("zero_drift", 0.2 * drift)) == []  # hardly anything
+    (said,) = told(drifting.held_after(200.0, ()))
+    assert "up to 200 s, the end of what was fitted, and holds it from then on" in said
+    assert "(zero drift by -4 %)" in said
+    assert told(drifting) == []  # a cause is told as one, and goes on
+    assert told(MODEL.with_part("zero_drift", 0.2 * drift).held_after(200.0, ())) == []  # hardly anything
     assert told(MODEL) == []
+
+
+def test_a_drift_that_is_no_named_law_is_held_from_the_end_of_what_was_fitted_on(one: Session) -> None:
+    """What is held out goes on for longer: nothing that was fitted tells how such a drift goes on."""
+    drifting = MODEL.with_part("gain_drift").with_part("zero_drift").with_part("linear_leak")
+    named: Any = SimpleNamespace(names=[name_of("zero_drift")])
+    longer = replace(
+        one,
+        conditions=replace(one.conditions, time_s=one.conditions.time_s + 100.0),
+        held_out=np.ones_like(one.held_out),
+    )
+    held = _held(drifting, named, [one, longer])
+    assert {part.name: part.until_s for part in held.parts} == {
+        "gain_drift": one.conditions.time_s[-1], "zero_drift": math.inf, "linear_leak": math.inf,
+    }  # fmt: skip
+    carried_on = replace(one, conditions=replace(one.conditions, before={"time_s": 50.0}))
+    held = _held(drifting, named, [one, carried_on])
+    assert held.part("gain_drift").until_s == 50.0 + one.conditions.time_s[-1]
+    of_free_form: Any = SimpleNamespace(names=[name_of("gain_drift")])
+    free = MODEL.with_part("flexible_gain_drift")
+    assert _held(free, of_free_form, [one]).parts[0].until_s == one.conditions.time_s[-1]
 
 
 def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Session) -> None:

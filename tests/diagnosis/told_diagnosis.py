@@ -35,6 +35,10 @@ class _Session:
     usable: NDArray[np.bool_] = field(default_factory=lambda: np.ones(3, dtype=bool))
 
     @property
+    def conditions(self) -> Any:
+        return SimpleNamespace(time_s=np.arange(3.0), before={})
+
+    @property
     def recording(self) -> Any:
         return SimpleNamespace(sensor=SimpleNamespace(unit=SCALE.unit))
 

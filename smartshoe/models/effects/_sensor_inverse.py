@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CStep, Inverse
@@ -25,6 +28,13 @@ class Memoryless(Inverse):
     def push(self, signal: Array, time_s: Array) -> Array:
         """The block's input (n,), each sample by itself."""
         return self.undo(signal, time_s)
+
+    def until(self, last_s: float) -> Memoryless:
+        """The same by a clock that stands still from ``last_s`` on."""
+        return Memoryless(
+            lambda signal, time_s: self.undo(signal, np.minimum(time_s, last_s)),
+            re.sub(r"\bt\b", f"fmin(t, {c_number(last_s)})", self.body),
+        )
 
     def c_step(self, name: str) -> CStep:
         """The body; nothing is kept from one sample to the next, so ``name`` is not needed."""

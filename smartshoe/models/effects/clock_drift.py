@@ -34,7 +34,7 @@ class ClockDrift(Effect):
         "delay": by("repeats", "steps"),
         "sensor_lag": by("repeats", "steps"),
     }
-    is_latency = True
+    is_latency = is_drift = True
     between_clocks = "rate"
     branch = "rates of two clocks"
     why_not_undone = "a stream of readings cannot be moved to another time: shift whole recordings instead"

@@ -104,6 +104,13 @@ class Conditions:
         """The same conditions, and what was derived from them, within a model whose arm relaxes so."""
         return replace(self, relaxing=(share, rate_per_s))
 
+    def until(self, last_s: float) -> Conditions:
+        """The same with a clock that stands still from ``last_s`` on, seconds since the session began."""
+        stands_s = last_s - self.before.get("time_s", 0.0)
+        if not self.time_s.size or self.time_s[-1] <= stands_s:
+            return self
+        return replace(self, time_s=np.minimum(self.time_s, stands_s))
+
     def kept(self, name: str, numbers: tuple[float, ...], make: Callable[[], Array]) -> Array:
         """What ``make`` derives from these conditions and ``numbers`` alone: the last few by a name are kept.
 
@@ -189,6 +196,8 @@ class Effect(ABC):
     ``is_seen_at_rest``: True where the reading without load shows the effect's size.
     ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
     ``between_clocks``: "lag" or "rate" where the one value of a latency is what two clocks differ by.
+    ``is_drift``: True where it goes on with the time since the session began, whatever the load; on a stream it is
+    undone by a `Memoryless` inverse.
     ``is_leak``: True where air leaves the tube, so that an inverse sums up what is gone from the readings.
     ``clips``: a reading that it moves tells no load any more.
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
@@ -221,6 +230,7 @@ class Effect(ABC):
     is_seen_at_rest: ClassVar[bool] = False
     shifts: ClassVar[Literal["load", "reading"] | None] = None
     between_clocks: ClassVar[Literal["lag", "rate"] | None] = None
+    is_drift: ClassVar[bool] = False
     is_leak: ClassVar[bool] = False
     clips: ClassVar[bool] = False
     why_not_undone: ClassVar[str] = ""

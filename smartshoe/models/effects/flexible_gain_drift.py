@@ -31,7 +31,7 @@ class FlexibleGainDrift(Effect):
         "cycle_conditioning": by("pauses", "rates", "temperature"),
         "mullins_softening": by("pauses", "shuffled_loads"),
     }
-    is_flexible = True
+    is_flexible = is_drift = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the session's start."""

@@ -53,6 +53,7 @@ class GainDrift(Effect):
         "mullins_softening": by("pauses", "shuffled_loads"),
         "zero_drift": by("rests", "peaks"),
     }
+    is_drift = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the first session's start."""

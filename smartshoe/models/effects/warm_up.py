@@ -32,7 +32,7 @@ class WarmUp(Effect):
         "zero_drift": by("idle"),
         "zero_offset": by("idle"),
     }
-    is_seen_at_rest = True
+    is_seen_at_rest = is_drift = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and what the zero has moved."""

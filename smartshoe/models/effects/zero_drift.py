@@ -46,7 +46,7 @@ class ZeroDrift(Effect):
         "permanent_set": by("pauses", "shuffled_loads"),
         "warm_up": by("idle"),
     }
-    is_seen_at_rest = True
+    is_seen_at_rest = is_drift = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the drift since the session's start."""
