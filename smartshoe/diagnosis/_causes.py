@@ -11,7 +11,7 @@ from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import Name, confidence_of
 from smartshoe.diagnosis._parameters import in_unit, parameters_of
-from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Cause, Rival, Statement
+from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Cause, Rival, Statement, likelier_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import Zero
@@ -40,7 +40,7 @@ def cause_of(
         _without_it(name),
         *_held_out_evidence(member.size, won, thresholds.material),
         *_against(rivals, name.equivalents),
-        *_how_sure(name, found, thresholds),
+        *_how_sure(name, law, rivals, found, thresholds),
         *_missed_by(law, name, thresholds),
         *_not_shown(name, excitation),
     )
@@ -81,7 +81,9 @@ def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[S
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 
-def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Statement]:
+def _how_sure(
+    name: Name, law: Alternative | None, rivals: Sequence[Rival], found: Inference, thresholds: Thresholds
+) -> list[Statement]:
     """Why it is named though it is not sure, or though no law of its kind follows it."""
     if not name.is_sure:
         does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
@@ -90,12 +92,18 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
             if does_most_alone
             else "it is larger than all that is left, or than small imperfections and the laws beside it account for"
         )
-        says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
+        doubt = "it may stand for what equations miss, or for a part of another cause"
+        if name.equivalents or likelier_of(rivals, name.equivalents):
+            doubt = "other effects do as well"
+        says = f"it is not sure, since {doubt}; it is named because {why}"
         return [Statement(OF_A_DOUBTED_CAUSE, name.kind_probability, thresholds.least_confidence, says)]
     if name.kind_only:
-        why = "no equation of its kind fits better than others"
+        why = "no equation of its kind rules the others out"
         if not name.equivalents:
-            why = f"{in_words(name.effect.name)} is by far the nearest, and misses more than equations do"
+            nearest = in_words(name.effect.name)
+            why = f"{nearest} is by far the nearest, and misses more than equations do"
+            if law is not None and thresholds.clear * law.margin > name.member.fall:
+                why = f"none of its kind follows half of it, {nearest} comes nearest"
         says = (
             f"what it does to the reading is sure, by which law it does so is not: {why}, and it may be an effect that"
             " the catalogue does not have"

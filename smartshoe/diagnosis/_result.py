@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -82,6 +82,11 @@ class Rival:
         return {"effect": self.effect, "margin": finite_or_none(self.margin), "by": self.by}
 
 
+def likelier_of(rivals: Sequence[Rival], equivalents: Sequence[str]) -> tuple[Rival, ...]:
+    """Those that alone in a cause's place would be as likely or likelier, beside what cannot be ruled out."""
+    return tuple(one for one in rivals if one.may_be_likelier and one.effect not in equivalents)
+
+
 @dataclass(frozen=True, eq=False)
 class Cause:
     """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale.
@@ -106,6 +111,11 @@ class Cause:
     def name(self) -> str:
         """The effect's identifier."""
         return self.effect.name
+
+    @property
+    def as_likely(self) -> tuple[Rival, ...]:
+        """The rivals that alone in its place would be as likely or likelier, though nothing else says so."""
+        return likelier_of(self.rivals, self.equivalents)
 
     @property
     def doubt(self) -> str:

@@ -353,14 +353,20 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.9, STANDARD.least_confidence)
     assert kind.says == (
-        "what it does to the reading is sure, by which law it does so is not: no equation of its kind fits better than"
-        " others, and it may be an effect that the catalogue does not have"
+        "what it does to the reading is sure, by which law it does so is not: no equation of its kind rules the"
+        " others out, and it may be an effect that the catalogue does not have"
     )
     alone = _told(monkeypatch, exposed, kind_only=True, equivalents=()).evidence[-1]
     assert "by which law it does so is not: linear leak is by far the nearest, and misses more than" in alone.says
+    # 200 of its 400 missed is half; beyond it a law follows nothing to speak of, at null at the worst.
+    for missed, is_near in ((200.0, True), (201.0, False)):
+        laws = (("linear_leak", missed),)
+        said = _told(monkeypatch, exposed, kind_only=True, equivalents=(), laws=laws).evidence[-2].says
+        assert ("linear leak is by far the nearest" in said) is is_near
+        assert ("none of its kind follows half of it, linear leak comes nearest" in said) is not is_near
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
-    named = "it is not sure, since other effects fit nearly as well; it is named because"
+    named = "it is not sure, since other effects do as well; it is named because"
     size = f"{named} it is larger than all that is left, or than small imperfections and the laws beside it account for"
     assert doubt.says == size
     for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from diagnoses_made import BASELINE, LEAK, LEAK_CAUSE, PLAY_CAUSE, case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smartshoe.diagnosis import Gain, Rival
+from smartshoe.diagnosis import Gain, Rival, Thresholds
+from smartshoe.diagnosis._causes import _how_sure
 from smartshoe.display import sure
 from smartshoe.models.effects import effect, listed, shift_of
 from smartshoe.models.extended import ExtendedModel
@@ -72,6 +74,35 @@ def test_a_rival_that_is_likelier_is_told_as_such_and_not_as_ruled_out() -> None
     untold = replace(cause, equivalents=("clock_drift", "zero_drift"))
     assert likelier(untold) == []
     assert "alone" not in why_this_one(untold)
+
+
+@given(
+    margins=st.dictionaries(
+        st.sampled_from(["zero_drift", "delay", "dead_band", "orifice_leak"]), st.floats(-200.0, 200.0)
+    ),
+    equivalents=st.lists(st.sampled_from(["zero_drift", "orifice_leak", "gas_heat"]), unique=True),
+    is_sure=st.booleans(),
+    kind_only=st.booleans(),
+    alone=st.sampled_from([None, "linear_leak", "delay"]),
+)
+def test_what_is_said_of_a_cause_does_not_contradict_itself(
+    margins: dict[str, float], equivalents: list[str], is_sure: bool, kind_only: bool, alone: str | None
+) -> None:
+    rivals = tuple(sorted((Rival(*one) for one in margins.items()), key=lambda one: one.margin))
+    name: Any = SimpleNamespace(
+        effect=LEAK_CAUSE.effect, equivalents=tuple(equivalents), is_sure=is_sure, kind_only=kind_only,
+        kind_probability=0.5, member=SimpleNamespace(fall=100.0),
+    )  # fmt: skip
+    found: Any = SimpleNamespace(alone=None if alone is None else effect(alone))
+    evidence = tuple(_how_sure(name, None, rivals, found, Thresholds()))
+    cause = replace(LEAK_CAUSE, rivals=rivals, equivalents=name.equivalents, evidence=evidence)
+    this_one = why_this_one(cause)
+    others_may_be = "cannot be ruled out" in this_one or "alone in its place" in this_one
+    assert others_may_be is not this_one.startswith("no other effect of the catalogue")
+    if not is_sure:
+        assert ("other effects do as well" in cause.doubt) is others_may_be
+    if is_sure and kind_only:
+        assert ("rules the others out" in cause.doubt) is bool(equivalents)
 
 
 @pytest.mark.parametrize(

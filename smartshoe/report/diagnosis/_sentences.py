@@ -344,7 +344,7 @@ def ruled_out(cause: Cause) -> list[Neighbour]:
 
 def likelier(cause: Cause) -> list[Neighbour]:
     """The effects that alone in the place of a cause would be as likely or likelier, though nothing else says so."""
-    return neighbours(cause, [rival.effect for rival in _others(cause) if rival.may_be_likelier])
+    return neighbours(cause, [rival.effect for rival in cause.as_likely])
 
 
 def _others(cause: Cause) -> list[Rival]:
