@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from smartshoe.diagnosis import Gain, Rival, Thresholds
 from smartshoe.diagnosis._causes import _how_sure
+from smartshoe.diagnosis._result import Verdict
 from smartshoe.display import sure
 from smartshoe.models.effects import effect, listed, shift_of
 from smartshoe.models.extended import ExtendedModel
@@ -174,6 +175,19 @@ def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> Non
     of_zeros = replace(made, extended=made.baseline)
     assert heading(of_zeros) == "The simulation is good enough once the zero of the recordings is allowed for"
     assert heading(replace(of_zeros, verdict="partly_explained")).startswith("The simulation is wrong")
+
+
+@pytest.mark.parametrize("verdict", ["explained", "partly_explained"])
+def test_nothing_is_headed_as_explained_by_an_extension_that_is_rejected(verdict: Verdict) -> None:
+    named = replace(LEAK_CAUSE, part="linear_leak")
+    made = replace(case("one cause"), verdict=verdict, causes=(named,))
+    assert "explained" in heading(made) or "it is known why" in heading(made)
+    rejected = heading(replace(made, rejected=BASELINE))
+    assert rejected == (
+        "The simulation is wrong, and what would explain it is rejected: it is worse on data that was not fitted"
+    )
+    of_rest = replace(named, effect=shift_of("reading"), part=None)  # a rest shows it, whatever is rejected
+    assert heading(replace(made, causes=(of_rest,), rejected=BASELINE)) != rejected
 
 
 def test_how_numbers_of_causes_are_read_is_said_where_it_matters() -> None:

@@ -25,6 +25,7 @@ HEADINGS = {
     "refused": "No diagnosis: this data does not allow one",
 }
 NOT_SURE = "The simulation is wrong, and it is known what follows it, though not each cause is sure"
+REJECTED = "The simulation is wrong, and what would explain it is rejected: it is worse on data that was not fitted"
 OF_THEIR_OWN = "The simulation is good enough once the zero of the recordings is allowed for"
 INTERVALS = (
     "A parameter's interval is of the noise alone: where its equation is not exact the value may be off by more."
@@ -47,8 +48,11 @@ NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
 def heading(diagnosis: Diagnosis) -> str:
     """The verdict, and whether each cause is sure.
 
-    Where all that is named is of recordings, as a zero is, the plain model allows for it.
+    Where all that is named is of recordings, as a zero is, the plain model allows for it. Nothing is said to be
+    explained by an extension that is rejected.
     """
+    if diagnosis.rejected is not None and any(cause.part is not None for cause in diagnosis.causes):
+        return REJECTED
     if diagnosis.verdict != "explained":
         return HEADINGS[diagnosis.verdict]
     if is_of_recordings(diagnosis):
