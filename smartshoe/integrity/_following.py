@@ -77,8 +77,16 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
 
 
 def _is_noise(view: View) -> bool:
-    """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp."""
-    return view.load_span <= 2.0 * view.load.largest * view.load.quiet_noise
+    """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp.
+
+    One that goes anywhere within a sample is none where most of its variance is none of its steps', as that of a drive
+    that is off for hours: noise is as far from its last value as from any other (von Neumann 1941).
+    """
+    load = view.load.values
+    if view.load_span > 2.0 * view.load.largest * view.load.quiet_noise:
+        return False
+    white = 0.5 * float(np.mean(np.diff(load) ** 2)) if load.size > 1 else 0.0
+    return float(np.var(load)) <= view.thresholds.clear * white
 
 
 def _answers(view: View) -> bool:

@@ -85,7 +85,25 @@ def test_a_load_of_a_few_samples_a_ramp_that_is_followed_is_no_noise(period_s: f
     )
     assert followed.faults == ()
     assert [fault.kind for fault in not_followed.faults] == ["does_not_follow_load"]
-    assert "no more than its noise" in not_followed.refusals[0]
+    # Of fewer than six samples a cycle more than half of the variance is in its steps, as noise's is.
+    assert ("no more than its noise" in not_followed.refusals[0]) is (period_s < 0.6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_load_that_is_off_for_hours_is_no_noise_whatever_it_is_when_it_is_on(seed: int) -> None:
+    """A boiler, logged by the hour, and a house that follows for a day; noise is off for no longer than by chance."""
+    rng = np.random.default_rng(seed)
+    is_on = np.tile(np.repeat([False, True], [8, 16]), 14)
+    drawn = 2.5 * rng.integers(8, 36, is_on.size)
+    time_s = 3600.0 * np.arange(is_on.size)
+    other = np.cumsum(rng.standard_normal(is_on.size))
+    by_day, shuffled = (
+        examine([Recording.from_arrays(time_s=time_s, force_n=load_n, room_v=other)])
+        for load_n in (np.where(is_on, drawn, 0.0), rng.permutation(np.where(is_on, drawn, 0.0)))
+    )
+    assert "the reading does not " in by_day.refusals[0]
+    assert "noise" not in by_day.refusals[0]
+    assert "no more than its noise" in shuffled.refusals[0]
 
 
 @pytest.mark.parametrize("first", [0.0, 0.2, 0.35])
