@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from smartshoe.diagnosis._scale import Scale, thinning
 from smartshoe.diagnosis._session import Session, prepare
+from smartshoe.files.gate import limits
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
@@ -100,6 +102,26 @@ EXPERIMENTS: Mapping[str, Callable[[float], Protocol]] = {
         steps, multisine, minor_loops, shuffled_loads, rates, holds_at_several_loads, long_hold, pauses, idle,
     )
 }  # fmt: skip
+
+
+def paced(protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Protocol:
+    """The same so slowly that a log of a sample every ``sample_time_s`` shows it; itself where that does already.
+
+    It holds a ``few`` samples of each hold, and of a ramp from no load to the peak at the fastest rate, but for loads
+    that are changed at once, and of all of it as many as tell anything; but it lasts no longer than any may.
+    """
+    least_s, at_n = protocol.duration_s * thresholds.few / thresholds.least_samples, 0.0
+    for one in protocol.segments:
+        if one.duration_s > STEP_S:
+            of_all = abs(one.load_n - at_n) / protocol.peak_load_n or 1.0
+            least_s = min(least_s, one.duration_s / of_all)
+        at_n = one.load_n
+    slower = min(thresholds.few * sample_time_s / least_s, (1.0 - 1e-9) * limits().duration_s / protocol.duration_s)
+    if slower <= 1.0:
+        return protocol
+    return replace(
+        protocol, segments=tuple(replace(one, duration_s=slower * one.duration_s) for one in protocol.segments)
+    )
 
 
 def run_on(unit: ExtendedModel, protocol: Protocol, peak_n: float, sample_time_s: float) -> Recording:

@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._excitation import Excitation
-from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._experiments import EXPERIMENTS, paced
 from smartshoe.diagnosis._gains_and_zeros import changes_of, time_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
@@ -79,7 +79,9 @@ def next_experiment(
     least = excitation.thresholds.least_confidence
     is_unsure = any(cause.confidence < least or (cause.equivalents and cause.part is None) for cause in causes)
     if open_ or is_unsure:
-        return _with_its_loads(_unseen(found, pair, excitation), sessions, excitation.thresholds)
+        return _with_its_loads(
+            _unseen(found, pair, excitation, _least_step_s(sessions)), sessions, excitation.thresholds
+        )
     return told[0] if told else None
 
 
@@ -107,17 +109,17 @@ def _fastest_n_per_s(recording: Recording) -> float:
 def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
     """The shortest protocol that rules a cause's nearest equivalent out, or tells clearly more than this data.
 
-    Of those that this data does not hold already, and of which its logger takes enough samples to tell anything. Where
-    none rules it out, the channel that would, if there is one. What is foretold is a unit of the cause: of another one
-    nothing is said.
+    Of those that this data does not hold already, each as slow as its logger asks for, of which that takes enough
+    samples to tell anything. Where none rules it out, the channel that would, if there is one. What is foretold is a
+    unit of the cause: of another one nothing is said.
     """
     rival = cause.equivalents[0]
     now = _contest(found, cause, rival)
-    peak_n, least_s = found.fit.model.full_scale_load_n, min(one.recording.sample_time_s for one in sessions)
-    made = [make(peak_n) for make in EXPERIMENTS.values()]
-    seen = [one for one in made if one.duration_s >= thresholds.least_samples * least_s]
+    peak_n, least_s = found.fit.model.full_scale_load_n, _least_step_s(sessions)
+    made = [paced(make(peak_n), least_s, thresholds) for make in EXPERIMENTS.values()]
+    made = [one for one in made if one.duration_s > (thresholds.least_samples - 1) * least_s]
     held = now.cause.likelihood.sessions
-    left = [one for one in seen if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
+    left = [one for one in made if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
     no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
     of_use = min(thresholds.clear * now.log_odds, _ruled_out_at(thresholds))
     foretold: list[tuple[Protocol, Contest]] = []
@@ -151,6 +153,11 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
             f" {no_use}"
         )
     return NextExperiment(names, protocol.name, channel, says, then.margin - now.margin, protocol)
+
+
+def _least_step_s(sessions: Sequence[Session]) -> float:
+    """The time from sample to sample of the recording that was logged most quickly."""
+    return min(one.recording.sample_time_s for one in sessions)
 
 
 def _rules_out(contest: Contest, thresholds: Thresholds) -> bool:
@@ -225,7 +232,7 @@ def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:
     return next(((cause.name, *names) for cause, names in others if names), ())
 
 
-def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) -> NextExperiment:
+def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation, sample_time_s: float) -> NextExperiment:
     """The first protocol that holds what this data lacks; the same again where it lacks nothing.
 
     Before all others what would tell the first of ``names`` from the rest, as the catalogue has it.
@@ -239,7 +246,8 @@ def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) ->
     if lacking:
         name = SHOWN_BY[lacking[0]]
         says = f"run the protocol {in_words(name)}: this data lacks {SAYS[lacking[0]]}, by which kinds differ"
-        return NextExperiment(names, name, None, says, None, EXPERIMENTS[name](peak_n))
+        steps = paced(EXPERIMENTS[name](peak_n), sample_time_s, excitation.thresholds)
+        return NextExperiment(names, name, None, says, None, steps)
     says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"
     return NextExperiment(names, "repeat", None, says)
 

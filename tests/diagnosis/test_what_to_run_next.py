@@ -14,12 +14,13 @@ from test_diagnosis_parts import MODEL, likelihood_of, recording, sessions_of
 
 from smartshoe import Protocol, Recording, diagnose
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
-from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._experiments import EXPERIMENTS, paced
 from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
 from smartshoe.diagnosis._prepared import prepared as made_ready
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._sensitivity import logged_words
+from smartshoe.files.gate import limits
 from smartshoe.integrity import examine
 from smartshoe.models.effects import effect
 from smartshoe.models.effects.exposure import SAYS, Exposure
@@ -150,14 +151,14 @@ def _lacking(*words: str) -> Excitation:
 )
 def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None:
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
-    told = _unseen(found, (), _lacking(word))
+    told = _unseen(found, (), _lacking(word), STEP_S)
     assert told.protocol == protocol
     assert told.steps is not None
     assert (told.steps.name, told.steps.peak_load_n) == (protocol, pytest.approx(800.0, rel=0.06))
     assert told.says == (
         f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
     )
-    assert _unseen(found, (), _lacking()).protocol == "repeat"
+    assert _unseen(found, (), _lacking(), STEP_S).protocol == "repeat"
     # It shows what it is run for.
     step_s = 0.01 if word == "steps" else STEP_S
     load = told.steps.load_at(np.arange(0.0, told.steps.duration_s, step_s)) / 800.0
@@ -167,17 +168,19 @@ def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None
 def test_where_peaks_go_with_the_clock_they_are_shuffled_first() -> None:
     """That alone leaves every cause half sure; of one peak load it is as good as what else is lacking."""
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
-    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads")).protocol == "shuffled_loads"
-    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads", "peaks")).protocol == "rates"
+    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads"), STEP_S).protocol == "shuffled_loads"
+    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads", "peaks"), STEP_S).protocol == "rates"
 
 
 def test_of_what_lacks_that_comes_first_which_tells_the_pair() -> None:
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
     lacking = "rates", "rests", "pauses", "steps"
-    told = {rivals: _unseen(found, rivals, _lacking(*lacking)).protocol for rivals in ((), ("delay", "sensor_lag"))}
+    told = {
+        rivals: _unseen(found, rivals, _lacking(*lacking), STEP_S).protocol for rivals in ((), ("delay", "sensor_lag"))
+    }
     assert told == {(): "rates", ("delay", "sensor_lag"): "steps"}
     clocked = _lacking(*lacking, "shuffled_loads")
-    assert _unseen(found, ("delay", "sensor_lag"), clocked).protocol == "shuffled_loads"
+    assert _unseen(found, ("delay", "sensor_lag"), clocked, STEP_S).protocol == "shuffled_loads"
 
 
 @pytest.mark.parametrize(
@@ -258,15 +261,35 @@ def test_protocols_are_what_they_say() -> None:
     assert _rates(made["long_hold"]) == {0.25, round(1 / 3, 6)}
 
 
-def test_a_log_that_takes_hardly_a_sample_of_a_protocol_is_asked_for_none_of_those() -> None:
-    """As one that logs every two minutes, or whose time is in another unit: a protocol of a minute has no course there.
+def test_a_slow_log_is_asked_for_protocols_of_its_own_pace() -> None:
+    """As one that logs every two minutes: a protocol of a minute has no course there.
 
-    It ended in "steps holds one sample", of a protocol that nobody had given.
+    It ended in "steps holds one sample", of a protocol that nobody had given; then ramps of a second were proposed.
     """
     one = recording(MODEL.with_part(effect("play_hysteresis"), effect("play_hysteresis").begun(sizes=1.0)))
     found = diagnose(replace(one, time_s=5000.0 * one.time_s))
     assert found.causes
     assert found.next_experiment is not None
+    if found.next_experiment.steps is not None:
+        assert found.next_experiment.steps.duration_s >= 100.0 * 5000.0 * one.sample_time_s
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("sample_time_s", [0.01, 0.2, 1.0, 150.0])
+def test_a_log_shows_a_protocol_that_is_asked_for(name: str, sample_time_s: float) -> None:
+    """Of its ramps over all the load it has samples; where it has them of the usual protocol, that is the one."""
+    usual = EXPERIMENTS[name](800.0)
+    protocol = paced(usual, sample_time_s, STANDARD)
+    assert (protocol is usual) is (sample_time_s <= 0.2)
+    assert protocol.duration_s >= (1.0 - 1e-9) * 100.0 * sample_time_s
+    slower = protocol.duration_s / usual.duration_s
+    assert [one.duration_s for one in protocol.segments] == pytest.approx(
+        [slower * one.duration_s for one in usual.segments]
+    )
+    if name not in ("steps", "multisine"):  # whose loads change at once
+        assert protocol.peak_load_n / protocol.peak_rate_n_per_s >= (1.0 - 1e-9) * 5.0 * sample_time_s
+    assert slower <= 10.0 * max(sample_time_s, 0.1)
+    assert paced(usual, 1e5, STANDARD).duration_s == pytest.approx(limits().duration_s)  # and no longer than any may
 
 
 def test_a_protocol_goes_with_its_load() -> None:
