@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -24,13 +25,30 @@ WALL_RATIOS = 1.02, 50.0  # bounds of any tube's
 
 
 def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
-    """The best standard linear solid over a grid of poles, linear in the rest, so that no local optimum is taken.
+    """The best standard linear solid of a positive gain; its wall's ratio is that of `_wall_ratio`."""
+    _, gain, share, pole = _best_by_sign(sessions).get(1.0, (0.0, 1.0, 0.0, 0.2))
+    ratio = _wall_ratio(sessions, gain, scale)
+    return ExtendedModel(gain, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), ratio)
 
-    Either sign of what relaxes is allowed: a baseline that may not follow the data leaves structure that no
-    effect made.
+
+def is_turned_over(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
+    """Whether a solid of a negative gain follows ``sessions`` clearly better than any of a positive one.
+
+    What goes together at once does not tell the sign of a unit that is slower than its load: it rises still where the
+    load has fallen. Its static gain does.
+    """
+    errors = {sign: best[0] for sign, best in _best_by_sign(sessions).items()}
+    return thresholds.clear * errors.get(-1.0, math.inf) < errors.get(1.0, math.inf)
+
+
+def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float, float, float]]:
+    """Error, gain, share and pole in 1/s of the best solid of either sign of the gain, of those there are.
+
+    Over a grid of poles, linear in the rest, so that no local optimum is taken. Either sign of what relaxes is allowed:
+    a baseline that may not follow the data leaves structure that no effect made.
     """
     fitted = fitted_of(sessions)
-    best: tuple[float, float, float, float] | None = None
+    best: dict[float, tuple[float, float, float, float]] = {}
     for pole in POLES_PER_S:
         gram = np.zeros((3, 3))
         for session in fitted:
@@ -40,22 +58,16 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
         part = gram[1:, 1:] + 1e-9 * np.trace(gram[1:, 1:]) * np.eye(2)
         fast, slow = np.linalg.solve(part, gram[1:, 0])
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
-        gain = float(fast + slow)
-        if gain <= 0 or fast <= 0:
-            continue
-        share = min(max(gain / float(fast) - 1.0, SHARE.lower), SHARE.upper)
-        fast = gain / (1.0 + share)
-        slow = gain - fast
-        error = float(
-            gram[0, 0] - 2 * np.array([fast, slow]) @ gram[1:, 0] + np.array([fast, slow]) @ gram[1:, 1:] @ [fast, slow]
-        )
-        if best is None or error < best[0]:
-            best = error, gain, share, float(pole)
-    if best is None:
-        best = 0.0, 1.0, 0.0, 0.2
-    _, gain, share, pole = best
-    ratio = _wall_ratio(sessions, gain, scale)
-    return ExtendedModel(gain, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), ratio)
+        share = float(slow / fast) if fast != 0.0 else SHARE.upper
+        shares = (share,) if SHARE.lower <= share <= SHARE.upper else (SHARE.lower, SHARE.upper)
+        for share in shares:
+            shape = np.array([1.0, share]) / (1.0 + share)
+            gain = float(shape @ gram[1:, 0] / (shape @ part @ shape))
+            error = float(gram[0, 0] - gain * (shape @ gram[1:, 0]))
+            sign = math.copysign(1.0, gain)
+            if sign not in best or error < best[sign][0]:
+                best[sign] = error, gain, share, float(pole)
+    return best
 
 
 def with_usual_arm(model: ExtendedModel) -> ExtendedModel:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._aligned import Aligned, aligned, as_they_follow
-from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
+from smartshoe.diagnosis._baseline import baseline_of, is_turned_over, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._neighbours import with_one_neighbour
@@ -62,6 +62,9 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         replace(one, index=clocks.places[one.index])
         for one in prepare(clocks.recordings, clocks.usable, held, scale, factors, thresholds)
     ]
+    if not clocks.parts and is_turned_over(sessions, thresholds):
+        sessions = [replace(one, reading=-one.reading) for one in sessions]
+        scale = replace(scale, reading=-scale.reading)
     start = baseline_of(sessions, scale)
     if clocks.parts:  # against a load of another clock no relaxation is found
         start = with_usual_arm(start)

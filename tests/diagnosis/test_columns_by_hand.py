@@ -15,11 +15,20 @@ from told_evidence import WAVE, session_of
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._baseline import POLES_PER_S, SHARE, USUAL, _wall_ratio, baseline_of, with_usual_arm
+from smartshoe.diagnosis._baseline import (
+    POLES_PER_S,
+    SHARE,
+    USUAL,
+    _wall_ratio,
+    baseline_of,
+    is_turned_over,
+    with_usual_arm,
+)
 from smartshoe.diagnosis._force import force_error
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import FLOOR, correlated_sd
-from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._prepared import prepared
+from smartshoe.diagnosis._scale import Scale, full_scale
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
@@ -34,6 +43,8 @@ from smartshoe.diagnosis._sensitivity import (
     nuisances,
     where,
 )
+from smartshoe.diagnosis._session import prepare
+from smartshoe.integrity import examine
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect, is_told_from_its_family
 from smartshoe.models.effects.exposure import WORDS
@@ -379,13 +390,12 @@ def _slow_baseline(sessions: list[Any]) -> tuple[float, float, float]:
             rows.append(seen - past @ np.linalg.lstsq(past, seen, rcond=1e-10)[0])
         whole = np.concatenate(rows)
         fast, slow = np.linalg.lstsq(whole[:, 1:], whole[:, 0], rcond=None)[0]
-        total = fast + slow
-        if total <= 0.0 or fast <= 0.0:
-            continue
-        share = min(max(total / fast - 1.0, -0.9), 50.0)
-        fast = total / (1.0 + share)
-        left = whole[:, 0] - whole[:, 1] * fast - whole[:, 2] * (total - fast)
-        best = min(best, (float(left @ left), total, share, pole))
+        within = -0.9 <= slow / fast <= 50.0
+        for share in (slow / fast,) if within else (-0.9, 50.0):
+            column = (whole[:, 1:2] + share * whole[:, 2:]) / (1.0 + share)
+            (total,), square, *_ = np.linalg.lstsq(column, whole[:, 0], rcond=None)
+            if total > 0.0:
+                best = min(best, (float(square[0]), total, share, pole))
     _, total, share, pole = best
     return total, share, pole * (1.0 + share)
 
@@ -411,6 +421,34 @@ def test_a_share_beyond_what_a_wall_can_have_is_held_at_its_bound(fast: float, s
     told = found.gain, found.relaxing_share, found.relaxation_rate_per_s
     assert SHARE.lower <= found.relaxing_share <= SHARE.upper
     assert told == pytest.approx(_slow_baseline(sessions), rel=1e-5)
+
+
+def test_a_unit_that_is_slower_than_its_load_is_not_turned_over() -> None:
+    """Under three steps it rises still where the load has fallen; its static gain tells its sign."""
+    time_s = 0.2 * np.arange(180)
+    load_n = np.select([time_s < 1.0, time_s < 15.0, time_s < 30.0], [0.0, 80.0, 20.0], 70.0)
+    heated = 20.0 + 0.9 * lagged(lagged(load_n, 0.2, 18.0), 0.2, 1.0)
+    for sign in (1.0, -1.0):
+        one = Recording.from_arrays(time_s=time_s, force_n=load_n, heater_v=sign * heated)
+        usable = [np.ones(len(one), dtype=bool)]
+        scale = full_scale([one], usable, STANDARD)
+        assert scale.reading * sign < 0.0  # what goes together at once tells the other sign
+        sessions = prepare([one], usable, None, scale, [1], STANDARD)
+        assert is_turned_over(sessions, STANDARD)
+        assert not is_turned_over([replace(one, reading=-one.reading) for one in sessions], STANDARD)
+        assert prepared([one], 1, examine([one], STANDARD), STANDARD).scale.reading * sign > 0.0
+
+
+def test_a_sign_that_tells_little_stays_as_it_is() -> None:
+    sessions = _sessions(MODEL, noise=0.0)
+    for sign, is_turned in ((1.0, False), (-1.0, True)):
+        for one in sessions:
+            one.reading = sign * one.conditions.load
+        assert is_turned_over(sessions, STANDARD) is is_turned
+    rng = np.random.default_rng(1)
+    for one in sessions:
+        one.reading = rng.standard_normal(one.reading.size) - 0.1 * one.conditions.load
+    assert not is_turned_over(sessions, STANDARD)
 
 
 def test_a_reading_that_falls_under_load_has_a_plain_baseline() -> None:
