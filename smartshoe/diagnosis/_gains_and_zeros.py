@@ -81,6 +81,16 @@ class _Gained:
         each = (moments_of(one, self.evidence.thresholds).size for one in self.evidence.given.sessions)
         return self.evidence.odds + 2.0 * math.log(max(sum(each), 1))
 
+    @property
+    def is_conditioned(self) -> bool:
+        """Whether the wall's gain goes with load cycles, as these do not account for.
+
+        When within its cycles a unit conditions no law knows: as a load turns, its gain may change at once as well. So
+        what changes within recordings beside that is no slip.
+        """
+        effects = (self.evidence.given.candidates[one].effect for one in self.kept)
+        return any(one.needs_cycles and one.place == "wall" for one in effects)
+
     def searched(self) -> _Gained:
         """The same with the best set beside them."""
         return replace(self, kept=search(self.evidence, self.kept).members)
@@ -102,8 +112,8 @@ class _Gained:
 def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[Session] | None:
     """The same sessions with gains of their own where these are told, else with what changes at moments; else None.
 
-    Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise. A single
-    recording has no gain of its own.
+    Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise. Where the
+    wall still conditions beside these, they are how it does. A single recording has no gain of its own.
     """
     if any(one.gain_changes or one.zero_changes for one in sessions) or not may_differ(state, sessions):
         return None
@@ -116,7 +126,8 @@ def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[S
         if not sessions[0].own_gain_sd and are_told(state, found, gained):
             return gained.sessions
         changing = with_changes(state, gained)
-        by_gain = changing.sessions if changing is not gained and are_told(state, found, changing) else None
+        is_slip = changing is not gained and not changing.is_conditioned and are_told(state, found, changing)
+        by_gain = changing.sessions if is_slip else None
         rivals = [gained, changing]
     jumping = _with_jumping_zeros(state, sessions, rivals)
     return by_gain if jumping is None else jumping.sessions

@@ -208,6 +208,36 @@ def test_a_gain_that_changes_is_told_with_the_moment() -> None:
     assert change.share == pytest.approx(0.04, abs=0.005)
 
 
+def _conditioning(number: int) -> Recording:
+    """The gain rises with each peak's height, by ever less, at once as the load has come back by a tenth from it."""
+    rng = np.random.default_rng([number, 8])
+    load = np.interp(TIME_S, np.arange(15) * 40.0 / 14.0, np.insert(np.repeat(rng.uniform(0.5, 1.0, 7), 2), 0, 0.0)
+                     * np.array([0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1]))  # fmt: skip
+    borne, turn, way, gain = 0.0, 0.0, 1.0, np.ones(load.size)
+    for k, now in enumerate(load):
+        turn = way * max(way * turn, way * now)
+        if way * (turn - now) > 0.1:
+            borne += turn**1.2 if way > 0.0 else 0.0
+            turn, way = now, -way
+        gain[k] += 0.2 * (1.0 - (1.0 + borne / 4.0) ** -1.2)
+    share = gain * CURVED.simulate(Conditions(TIME_S, load, STEP_S)) + 0.2 * SD * rng.standard_normal(TIME_S.size)
+    return Recording.from_arrays(
+        time_s=TIME_S, force_n=800.0 * load, pressure_mbar=SPAN_MBAR * share, name=f"run_{number}"
+    )
+
+
+def test_a_wall_that_conditions_as_its_load_turns_does_not_slip() -> None:
+    """Its gain jumps in each cycle, and in every recording: no law of conditioning does so, and slips would fit."""
+    sessions = _sessions(*(_conditioning(k) for k in range(3)), factor=1)
+    gained = [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions]
+    conditioning = effect("cycle_conditioning")
+    for some in (sessions, gained):
+        start = CURVED.with_part(conditioning, conditioning.begun())
+        state = state_at(fit(Likelihood(some, SD, start, STANDARD), start))
+        told = with_likelier_gains(state, some) or some
+        assert not any(one.gain_changes for one in told)
+
+
 def test_a_gain_that_changes_without_load_is_told_within_the_stretch_that_does_not_show_it() -> None:
     load = np.repeat([0.0, 0.5, 0.01, 0.7, 0.0], 10)
     session: Any = SimpleNamespace(conditions=SimpleNamespace(load=load))
