@@ -89,9 +89,9 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
     by then, and what the unit is seen to remember from before the recording, as where a walk was cut: these are taken
-    out, and the third column is how much they are. The last two are the standard deviations that white noise leaves to
-    the means of load and reading. A load that begins to rise at once is no rest, nor is one whose reading, on a clock
-    that is early, has begun to rise before it.
+    out. The third column is how much they are: the drift's mean, and what is remembered as it begins. The last two are
+    the standard deviations that white noise leaves to the means of load and reading. A load that begins to rise at once
+    is no rest, nor is one whose reading, on a clock that is early, has begun to rise before it.
     """
     found = []
     for session in sessions:
@@ -117,11 +117,10 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         is_rest = lasts > 1 and abs(_risen(load[first][kept])) < thresholds.still_per_s * lasts_s
         if is_rest and lasts_s >= thresholds.settled_s:
             whole = model.simulate(session.conditions)
-            moved_by = whole - borne
-            rest = (session.reading - moved_by)[first][kept]
-            moved_by += _remembered(session, model, session.reading - whole, rest, first, thresholds)
-            drifted = float(np.mean(moved_by[first][kept]))
-            reading = float(np.mean(session.reading[first][kept])) - drifted
+            still = (session.reading - (whole - borne))[first][kept]
+            past = _remembered(session, model, session.reading - whole, still, first, thresholds)[first][kept]
+            drifted = float(np.mean((whole - borne)[first][kept]) + past[0])
+            reading = float(np.mean(still - past))
             noise = np.array([session.quiet.raw, session.white_sd / model.gain])
             noise /= np.sqrt(kept.sum() * session.thinned)  # as many were taken of it, whatever is left of them
             found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain, *noise))
@@ -211,7 +210,8 @@ def zeros_of(
     if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
     is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
-    is_clear[1] &= abs(reading + drift) >= many * as_read_sd  # one that only undoes a drift is that drift's error
+    # One that only undoes a drift is that drift's error; one that undoes a past, where what fades began: a drift began.
+    is_clear[1] &= abs(reading + drift) >= many * as_read_sd
     borne = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):
         return (Zero(sensor, borne, reading_sd, abs(borne), (machine.name,), True),)  # no cause more is needed

@@ -259,7 +259,20 @@ def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear_and_fades_t
     (rest,) = first_rests([one], MODEL, STANDARD)
     gone = 0.1 * float(np.mean(fading[:25])) if is_seen else 0.0
     read = float(np.mean(one.reading[:25]))
-    assert rest[:3] == pytest.approx(np.array([0.0, read - gone, gone]) / [1.0, 0.8, 0.8])
+    assert rest[:3] == pytest.approx(np.array([0.0, read - gone, 0.1 * is_seen]) / [1.0, 0.8, 0.8])
+
+
+@pytest.mark.parametrize(("stands_at", "is_named"), [(0.0, False), (0.01, True)])
+def test_a_past_that_begins_where_nothing_is_read_is_a_drift_and_no_offset(
+    monkeypatch: pytest.MonkeyPatch, stands_at: float, is_named: bool
+) -> None:
+    """1.6 % of full scale by which a sensor warms, as fast as a past would fade; beside an offset it is told as one."""
+    one = _rested(25)
+    warmed = -0.016 * np.expm1(-MODEL.pole_per_s * one.conditions.time_s)
+    one.reading = one.reading - 0.01 + stands_at + warmed
+    monkeypatch.setattr(_zero, "past_of", lambda *given: (-0.016, 1e-4))
+    found = zeros_of([one], MODEL, SCALE, 0.0, 0.0, STANDARD)
+    assert [zero.effect.shifts for zero in found] == ["reading"] * is_named
 
 
 # -- first rests ------------------------------------------------------------------------------------------------------
