@@ -174,9 +174,7 @@ def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds
         f"it is {deviations:.3g} standard deviations from nothing",
     )
     sure = (
-        thresholds.least_confidence
-        if zero.alternatives
-        else 1.0 - thresholds.false_name,  # by its model alone, or seen
+        1.0 - thresholds.false_name if zero.is_seen else thresholds.least_confidence,  # or by its model alone
         1.0 / (1.0 + len(zero.alternatives)),
     )
     evidence = (seen, *_held_out_evidence(zero.size, won, thresholds.material))

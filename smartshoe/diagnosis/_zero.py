@@ -2,7 +2,7 @@
 
 Every recording's offset is free in every fit, so that no effect depends on it. It is named where it is seen: a gauge
 sensor's reading of an unloaded unit is its zero; an unloaded machine's load is its cell's tare. Where the unit is
-never unloaded, either may make the same offset.
+never unloaded, or may be loaded where the log says nothing, either may make the same offset.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Zero:
     drift of the zero may have brought it there before the recordings began, so that no offset beside it is seen (nor a
     tare, where the unit bears the load that is shown, and the zero may have drifted to what it reads beyond that).
     ``led_from``: the load from which on it is led back to none, where what the unit does below, or remembers, may make
-    as much of it.
+    as much of it. ``is_seen``: a rest shows that there is one or the other of these, whatever the model.
     """
 
     effect: Effect
@@ -44,6 +44,7 @@ class Zero:
     alternatives: tuple[str, ...] = ()
     is_past: bool = False
     led_from: float = 0.0
+    is_seen: bool = True
 
 
 def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
@@ -188,11 +189,13 @@ def zeros_of(
     ``rubbed``: of those whose memory does not fade, so that a unit that begins loaded may stand anywhere within it.
     ``noise``: what is left that remembers; where it is noise, a rest holds it as any other stretch does.
     """
-    if scale.unit.quantity != "pressure":
+    is_gauge = scale.unit.quantity == "pressure"
+    commanded = any(one.recording.command_n is not None for one in fitted_of(sessions))
+    if not (is_gauge or commanded):
         return ()
     rests = first_rests(sessions, model, thresholds)
     sensor, machine = shift_of("reading"), shift_of("load")
-    if not rests.size:
+    if not rests.size and is_gauge:
         return _unseen(sessions, model, left, remembered, thresholds, rubbed)
     loads, readings, drifted, *white = rests.T
     load_sd, reading_sd = (
@@ -204,12 +207,11 @@ def zeros_of(
     load, reading, drift = (float(np.mean(one)) for one in (loads, readings, drifted))
     many = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
-    if abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
+    if is_gauge and abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
         return ()  # the reading agrees with the load, and the unit bears it
-    commanded = any(one.recording.command_n is not None for one in fitted_of(sessions))
     if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
-    is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
+    is_clear[1] &= is_gauge and abs(reading) <= thresholds.foreign_zero  # else it is a convention of the sensor's
     # One that only undoes a drift is that drift's error; one that undoes a past, where what fades began: a drift began.
     is_clear[1] &= abs(reading + drift) >= many * as_read_sd
     borne = (reading - load) * model.gain
@@ -220,7 +222,9 @@ def zeros_of(
         named.append(Zero(machine, -load, load_sd, abs(load * model.gain)))
     if is_clear[1]:
         value = reading * model.gain
-        named.append(Zero(sensor, value, reading_sd, abs(value), (), _is_past(value, sessions, model, thresholds)))
+        # A unit is pressed only: what it reads beyond nothing it may bear, where the load was set to zero under it.
+        bears = () if commanded or is_clear[0] or value < 0.0 else (machine.name,)
+        named.append(Zero(sensor, value, reading_sd, abs(value), bears, _is_past(value, sessions, model, thresholds)))
     return tuple(sorted(named, key=lambda one: -one.size))
 
 
@@ -281,4 +285,4 @@ def _unseen(
         return ()
     led_from = float(weights @ lowest) if abs(mean) < many * sd else 0.0
     is_past = _is_past(mean, sessions, model, thresholds)
-    return (Zero(shift_of("reading"), mean, sd, abs(mean), (shift_of("load").name,), is_past, led_from),)
+    return (Zero(shift_of("reading"), mean, sd, abs(mean), (shift_of("load").name,), is_past, led_from, False),)

@@ -441,11 +441,11 @@ def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelie
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])
-@pytest.mark.parametrize("alternatives", [(), ("another",)])
+@pytest.mark.parametrize(("alternatives", "is_seen"), [((), True), (("another",), True), (("another",), False)])
 def test_a_zero_is_a_cause_by_which_every_reading_is_off(
-    signal: str, factor: float, unit: str, alternatives: tuple[str, ...]
+    signal: str, factor: float, unit: str, alternatives: tuple[str, ...], is_seen: bool
 ) -> None:
-    zero = Zero(shift_of(signal), -0.02, 0.004, 0.03, alternatives)
+    zero = Zero(shift_of(signal), -0.02, 0.004, 0.03, alternatives, is_seen=is_seen)
     cause = zero_cause_of(zero, AFTER, SCALE, STANDARD)
     ((name, parameter),) = cause.parameters.items()
     assert name == zero.effect.parameters[0].name
@@ -460,7 +460,7 @@ def test_a_zero_is_a_cause_by_which_every_reading_is_off(
     assert (seen.value, seen.threshold) == (pytest.approx(5.0), pytest.approx(3.8906, abs=1e-4))
     assert "it is 5 standard deviations" in seen.says
     assert size.value == pytest.approx(3.0)
-    assert cause.confidence == (STANDARD.least_confidence if alternatives else 1.0 - STANDARD.false_name)
+    assert cause.confidence == (1.0 - STANDARD.false_name if is_seen else STANDARD.least_confidence)
     assert cause.law_confidence == (0.5 if alternatives else 1.0)
     assert (cause.equivalents, cause.size) == (alternatives, 0.03)
 

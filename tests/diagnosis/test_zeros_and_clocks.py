@@ -83,7 +83,12 @@ def test_a_reading_of_an_unloaded_unit_is_its_zero(offset: float) -> None:
     assert set(found) == {"zero_offset"}
     assert found["zero_offset"].value == pytest.approx(offset, rel=0.1)
     assert found["zero_offset"].size == pytest.approx(abs(offset), rel=0.1)
-    assert found["zero_offset"].alternatives == ()
+    # What is read beyond nothing the unit may bear, under a load cell that was set to zero there; less it cannot bear.
+    assert found["zero_offset"].alternatives == (("load_cell_tare",) if offset > 0.0 else ())
+    assert found["zero_offset"].is_seen
+    idle = _run(offset=offset, seed=1)
+    idle = idle.with_channel(replace(idle.load, name="command", role="command", values=FULL_N * PRESSED))
+    assert _zeros(idle)["zero_offset"].alternatives == ()  # nothing presses it
 
 
 @pytest.mark.parametrize("tare", [0.03, -0.02])
@@ -122,12 +127,24 @@ def test_no_zero_is_told_of_a_sensor_whose_zero_is_a_convention() -> None:
     assert _zeros(_run(offset=2.0), _run(offset=2.0)) == {}
 
 
+@pytest.mark.parametrize("tare", [0.03, -0.02, 0.0])
+def test_a_tare_is_told_of_any_sensor_where_a_command_says_that_nothing_presses(tare: float) -> None:
+    """Its reading at rest is a convention, the load there is none."""
+    plain = _run(tare=tare, offset=0.03, unit="v")
+    assert _zeros(plain) == {}  # it may bear what is shown
+    found = _zeros(plain.with_channel(replace(plain.load, name="command", role="command", values=FULL_N * PRESSED)))
+    assert [one.effect.name for one in found.values()] == ["load_cell_tare"] * bool(tare)
+    if tare:
+        assert found["load_cell_tare"].value == pytest.approx(-tare, rel=0.1)
+
+
 def test_a_unit_that_is_never_unloaded_leaves_open_which_zero_it_is() -> None:
     runs = [_run(foot=0.1, offset=0.1, seed=seed) for seed in range(3)]
     found = _zeros(*runs)
     assert set(found) == {"zero_offset"}
     assert found["zero_offset"].value == pytest.approx(0.1, abs=3.0 * found["zero_offset"].sd)
     assert found["zero_offset"].alternatives == ("load_cell_tare",)
+    assert not found["zero_offset"].is_seen
     # Whatever the model leaves or remembers may lie in the offset too.
     assert _zeros(*runs, left=0.05) == {}
     assert found["zero_offset"].led_from == 0.0
