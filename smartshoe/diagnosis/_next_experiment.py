@@ -52,8 +52,9 @@ def next_experiment(
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
     Where neither parts any, but recordings have gains of their own, one of them again. Where they have not, and
-    something is left (``open_``), or a name is not sure, what this data never showed; else that either may be used of
-    what is in doubt, None where nothing is. Where a single load cycle tells no cause, more of them.
+    something is left (``open_``), or a name is not sure, what this data never showed; else what tells a zero that is
+    seen from a tare, or that either may be used of what is in doubt, None where nothing is. Where a single load cycle
+    tells no cause, more of them.
     """
     pair = _pair(causes)
     if worse:
@@ -77,12 +78,22 @@ def next_experiment(
         )
         return NextExperiment(pair, "repeat", None, says)
     least = excitation.thresholds.least_confidence
-    is_unsure = any(cause.confidence < least or (cause.equivalents and cause.part is None) for cause in causes)
-    if open_ or is_unsure:
-        return _with_its_loads(
-            _unseen(found, pair, excitation, _least_step_s(sessions)), sessions, excitation.thresholds
-        )
-    return told[0] if told else None
+    zeros = [cause for cause in causes if cause.equivalents and cause.part is None]
+    is_unsure = any(cause.confidence < least for cause in causes)
+    if open_ or is_unsure or not all(effect(one.name).exposed_by <= excitation.present for one in zeros):
+        unseen = _unseen(found, pair, excitation, _least_step_s(sessions))
+        return _with_its_loads(unseen, sessions, excitation.thresholds)
+    by_reference = (_by_reference(zero, sessions) for zero in zeros)
+    return next((one for one in by_reference if one is not None), told[0] if told else None)
+
+
+def _by_reference(zero: Cause, sessions: Sequence[Session]) -> NextExperiment | None:
+    """What tells a zero that a rest shows from its equivalent, as the catalogue has it: no load does."""
+    word = _channel(zero.name, zero.equivalents[0], sessions)
+    if word is None:
+        return None
+    says = f"no load tells {in_words(zero.name)} from {in_words(zero.equivalents[0])}: what does is {SAYS[word]}"
+    return NextExperiment((zero.name, *zero.equivalents), None, in_words(word), says)
 
 
 def _with_its_loads(told: NextExperiment, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:

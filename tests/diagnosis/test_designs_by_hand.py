@@ -274,6 +274,7 @@ def _next(
     zero_changes: tuple[ZeroChange, ...] = (),
     channel: str | None = None,
     rate_n_per_s: float = 320.0,
+    present: frozenset[Any] = frozenset(),
 ) -> Any:
     monkeypatch.setattr(_next_experiment, "_contest", lambda found, cause, rival: contests[cause.name])
     monkeypatch.setattr(_next_experiment, "_channel", lambda name, rival, sessions: channel)
@@ -285,7 +286,7 @@ def _next(
     found: Any = SimpleNamespace(
         fit=SimpleNamespace(model=MODEL), can_validate=can_validate, own_gains=own_gains, zero_changes=zero_changes
     )
-    excitation = Excitation((0.1,), (1.0,), frozenset(), STANDARD)
+    excitation = Excitation((0.1,), (1.0,), present, STANDARD)
     sessions: list[Any] = [
         SimpleNamespace(recording=pressed(triangles(), step_s=step_s)) for step_s in (0.05, 0.005, 0.1)
     ]
@@ -414,6 +415,20 @@ def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytes
     assert once.says.startswith("repeat the load cycle")
     assert _next(monkeypatch, [sure, elsewhere], {}).says == f"unseen; {LOADS}"  # a zero that is no part of the model
     assert _next(monkeypatch, [], {}) is None
+
+
+def test_a_zero_that_a_rest_shows_is_told_from_a_tare_by_a_known_pressure_and_by_no_protocol(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    zero, rests = _cause("zero_offset", 0.02, ("load_cell_tare",), part=None), frozenset({"rests"})
+    told = _next(monkeypatch, [zero], {}, channel="pressure_reference", present=rests)
+    assert (told.separates, told.protocol, told.channel) == (
+        ("zero_offset", "load_cell_tare"), None, "pressure reference"
+    )  # fmt: skip
+    assert told.says.startswith("no load tells zero offset from load cell tare: what does is a pressure that is known")
+    assert _next(monkeypatch, [zero], {}, present=rests) is None
+    unsure = _cause("linear_leak", 0.02, (), confidence=0.74)
+    assert _next(monkeypatch, [zero, unsure], {}, channel="pressure_reference", present=rests).protocol == "unseen"
 
 
 def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and_moved(
