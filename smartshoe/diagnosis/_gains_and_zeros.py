@@ -83,13 +83,13 @@ class _Gained:
 
     @property
     def is_conditioned(self) -> bool:
-        """Whether the wall's gain goes with load cycles, as these do not account for.
+        """Whether the wall's gain goes with load cycles by a law, as these do not account for.
 
         When within its cycles a unit conditions no law knows: as a load turns, its gain may change at once as well. So
-        what changes within recordings beside that is no slip.
+        what changes within recordings beside that is no slip. A free form follows what goes with the time as well.
         """
         effects = (self.evidence.given.candidates[one].effect for one in self.kept)
-        return any(one.needs_cycles and one.place == "wall" for one in effects)
+        return any(one.needs_cycles and one.place == "wall" and not one.is_flexible for one in effects)
 
     def searched(self) -> _Gained:
         """The same with the best set beside them."""
