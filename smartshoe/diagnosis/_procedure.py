@@ -20,7 +20,6 @@ from smartshoe.diagnosis._force import (
     late_of,
     not_undone_of,
 )
-from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._lack_of_fit import repeating
@@ -211,7 +210,8 @@ def _is_silent(found: Inference, given: Prepared) -> bool:
 def _named(found: Inference, given: Prepared, left: _LeftOver) -> Chosen:
     """The causes in what was ``found``."""
     most = max(left.within.rms, left.within.size)
-    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, left.within.memory)
+    wanders = left.within.wanders(given.thresholds.hold_s)
+    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, wanders)
     return causes_among(found, given, zeros, most)
 
 
@@ -322,11 +322,11 @@ def _nearest(found: Inference) -> tuple[Rival, ...]:
     return tuple([Rival(name, fall, "alone") for name, fall in found.screening if name in catalogue()][:SAID])
 
 
-def _zeros(found: Inference, given: Prepared, left: float, noise: GaussMarkov | None) -> list[Zero]:
+def _zeros(found: Inference, given: Prepared, left: float, wanders: float) -> list[Zero]:
     """The offsets and tares that are seen beside what was ``found``, and are material."""
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     rubbed = math.hypot(*(one.size for one in found.members if one.effect.never_fades))
-    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, noise, rubbed)
+    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, wanders, rubbed)
     return [one for one in zeros if one.size >= given.thresholds.material]
 
 

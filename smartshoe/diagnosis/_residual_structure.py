@@ -56,6 +56,15 @@ class ResidualStructure:
         """Whether nothing is left but noise, slow or not."""
         return self.memory is not None and self.memory.is_noise and not self.significant
 
+    def wanders(self, duration_s: float) -> float:
+        """Standard deviation of its mean over ``duration_s`` wherever that lies: of noise, and of what changes slowly.
+
+        What repeats with the load's cycles has its places in them.
+        """
+        if self.memory is not None and self.memory.is_noise:
+            return self.memory.of_a_mean(duration_s)
+        return self.slow.rms if self.how == "changes slowly" else 0.0
+
     @property
     def is_tested(self) -> bool:
         """Whether a test would have shown all that is beyond white noise: else finding none says nothing.

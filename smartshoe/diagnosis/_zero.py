@@ -16,7 +16,6 @@ from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._baseline import is_stretched
-from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of, past_of, residual_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, all_fitted, begins_unloaded, fitted_of
@@ -86,13 +85,13 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
 
 
 def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:
-    """(m, 5) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
+    """(m, 6) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
     by then, and what the unit is seen to remember from before the recording, as where a walk was cut: these are taken
-    out. The third column is how much they are: the drift's mean, and what is remembered as it begins. The last two are
-    the standard deviations that white noise leaves to the means of load and reading. A load that begins to rise at once
-    is no rest, nor is one whose reading, on a clock that is early, has begun to rise before it.
+    out. The third column is how much they are, the fourth how much with what is remembered as it was at first. The last
+    two are the standard deviations that white noise leaves to the means of load and reading. A load that begins to rise
+    at once is no rest, nor is one whose reading, on a clock that is early, has begun to rise before it.
     """
     found = []
     for session in sessions:
@@ -120,12 +119,13 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
             whole = model.simulate(session.conditions)
             still = (session.reading - (whole - borne))[first][kept]
             past = _remembered(session, model, session.reading - whole, still, first, thresholds)[first][kept]
-            drifted = float(np.mean((whole - borne)[first][kept]) + past[0])
-            reading = float(np.mean(still - past))
+            drifted = float(np.mean((whole - borne)[first][kept]))
+            moved_by = np.array([drifted + np.mean(past), drifted + past[0]]) / model.gain
+            reading = float(np.mean(still - past)) / model.gain
             noise = np.array([session.quiet.raw, session.white_sd / model.gain])
             noise /= np.sqrt(kept.sum() * session.thinned)  # as many were taken of it, whatever is left of them
-            found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain, *noise))
-    return np.array(found).reshape(-1, 5)
+            found.append((float(np.mean(load[first][kept])), reading, *moved_by, *noise))
+    return np.array(found).reshape(-1, 6)
 
 
 def _remembered(
@@ -180,14 +180,14 @@ def zeros_of(
     left: float,
     remembered: float,
     thresholds: Thresholds,
-    noise: GaussMarkov | None = None,
+    wanders: float = 0.0,
     rubbed: float = 0.0,
 ) -> tuple[Zero, ...]:
     """What is named of the zeros, largest first; ``left``: rms of the structure that the model does not explain.
 
     Such structure may lie at rest as anywhere. ``remembered``: size of the effects with a memory of the wall.
     ``rubbed``: of those whose memory does not fade, so that a unit that begins loaded may stand anywhere within it.
-    ``noise``: what is left that remembers; where it is noise, a rest holds it as any other stretch does.
+    ``wanders``: standard deviation of the mean of what is left over a rest, which holds it as any other stretch does.
     """
     is_gauge = scale.unit.quantity == "pressure"
     commanded = any(one.recording.command_n is not None for one in fitted_of(sessions))
@@ -197,14 +197,13 @@ def zeros_of(
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size and is_gauge:
         return _unseen(sessions, model, left, remembered, thresholds, rubbed)
-    loads, readings, drifted, *white = rests.T
+    loads, readings, drifted, begun, *white = rests.T
     load_sd, reading_sd = (
         sd_of_a_mean(one, sds, thresholds) for one, sds in zip((loads, readings), white, strict=True)
     )
-    slow = noise.of_a_mean(thresholds.hold_s) / np.sqrt(len(rests)) if noise is not None and noise.is_noise else 0.0
-    as_read_sd = float(np.hypot(reading_sd, slow))
+    as_read_sd = float(np.hypot(reading_sd, wanders / np.sqrt(len(rests))))
     reading_sd = float(np.hypot(as_read_sd, thresholds.departure * np.mean(np.abs(drifted))))
-    load, reading, drift = (float(np.mean(one)) for one in (loads, readings, drifted))
+    load, reading, undone = (float(np.mean(one)) for one in (loads, readings, readings + begun))
     many = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
     if is_gauge and abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
@@ -213,7 +212,7 @@ def zeros_of(
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
     is_clear[1] &= is_gauge and abs(reading) <= thresholds.foreign_zero  # else it is a convention of the sensor's
     # One that only undoes a drift is that drift's error; one that undoes a past, where what fades began: a drift began.
-    is_clear[1] &= abs(reading + drift) >= many * as_read_sd
+    is_clear[1] &= abs(undone) >= many * as_read_sd
     borne = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):
         return (Zero(sensor, borne, reading_sd, abs(borne), (machine.name,), True),)  # no cause more is needed

@@ -299,6 +299,16 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
     assert left(quiet, quiet, replace(other, rms=0.001)).rms == 0.001
 
 
+def test_what_wanders_is_noise_that_remembers_and_what_changes_slowly_but_not_what_repeats() -> None:
+    repeated, wandering, quiet = LackOfFit(0.003, 50.0, 9, STANDARD), LackOfFit(0.002, 50.0, 9, STANDARD), NOTHING
+    noise = _memory(tau_s=0.75, rms=0.004)
+    for repeats_, slow_, memory, most in (
+        (quiet, wandering, None, 0.002), (repeated, wandering, None, 0.0), (quiet, quiet, None, 0.0),
+        (quiet, wandering, noise, 0.004 / math.sqrt(2.0)), (quiet, quiet, replace(noise, coloured=9.0), 0.0),
+    ):  # fmt: skip
+        assert ResidualStructure(repeats_, slow_, memory, "", 0.0035).wanders(3.0) == pytest.approx(most)
+
+
 def test_what_is_left_is_tested_where_a_test_would_show_all_of_it() -> None:
     blind, keen = LackOfFit(0.0, 0.0, 9, STANDARD), LackOfFit(0.0, 0.0, 9, STANDARD, 1e-12)
     for repeats_, slow_, memory, told in (

@@ -15,7 +15,6 @@ from scipy.stats import t as student
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of
-from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._limits import wall_ratio_of
 from smartshoe.diagnosis._scale import Scale, full_scale
@@ -164,7 +163,7 @@ def test_a_first_rest_is_what_is_commanded_where_a_tare_lifts_the_load() -> None
     commanded = plain.with_channel(replace(plain.load, name="command", role="command", values=FULL_N * PRESSED))
     sessions, _ = _sessions(commanded)
     rests = first_rests(sessions, MODEL, STANDARD)
-    assert rests.shape == (1, 5)
+    assert rests.shape == (1, 6)
     load, reading = float(sessions[0].conditions.load[0]), float(np.mean(sessions[0].reading[:25]))
     assert rests[0, :2] == pytest.approx([load, reading], abs=2e-3)
 
@@ -235,18 +234,14 @@ def test_no_tare_is_told_where_a_drift_may_have_come_by_what_is_read_beyond_the_
     assert {name for name, _ in told(0.006, *pulled)} == both
 
 
-def test_an_offset_within_what_slow_noise_makes_of_a_rest_is_none() -> None:
-    noise = replace(GaussMarkov(0.0, 1.5, 0.0, 0.0, 0.0, 0.0, STANDARD), rms=0.02)
+def test_an_offset_within_what_wanders_is_none() -> None:
     sessions, scale = _sessions(_run(offset=0.03, seed=1), _run(offset=0.03, seed=2))
     model = baseline_of(sessions, scale)
     (known,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD)
-    assert zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, noise) == ()
-    (quieter,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, replace(noise, rms=0.002))
-    of_the_mean = 0.002 / np.sqrt(2.0)  # a memory of half the rest's three seconds: each rest is one look at it
-    assert quieter.sd == pytest.approx(np.hypot(known.sd, of_the_mean), rel=1e-6)
-    structure = replace(noise, coloured=9.0)  # what is no noise is counted with the structure
-    (same,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, structure)
-    assert (same.value, same.sd) == (known.value, known.sd)
+    assert zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, 0.02) == ()
+    (quieter,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, 0.002)
+    one_look_each = 0.002 / np.sqrt(2.0)
+    assert quieter.sd == pytest.approx(np.hypot(known.sd, one_look_each), rel=1e-6)
 
 
 def test_each_recordings_own_offset_is_found_under_a_model() -> None:

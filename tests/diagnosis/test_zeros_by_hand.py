@@ -50,6 +50,7 @@ def _seen(
 ) -> dict[str, Any]:
     """By loads, readings and drifts of first rests, and the noise of both means."""
     told = np.array([(*one, 0.0, 0.0)[:5] for one in rests]).reshape(-1, 5)
+    told = np.insert(told, 3, told[:, 2], axis=1)  # nothing fades
     monkeypatch.setattr(_zero, "first_rests", lambda *given: told)
     found = zeros_of([], MODEL, scale, 0.0, 0.0, STANDARD)
     sizes = [one.size for one in found]
@@ -259,7 +260,7 @@ def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear_and_fades_t
     (rest,) = first_rests([one], MODEL, STANDARD)
     gone = 0.1 * float(np.mean(fading[:25])) if is_seen else 0.0
     read = float(np.mean(one.reading[:25]))
-    assert rest[:3] == pytest.approx(np.array([0.0, read - gone, 0.1 * is_seen]) / [1.0, 0.8, 0.8])
+    assert rest[:4] == pytest.approx(np.array([0.0, read - gone, gone, 0.1 * is_seen]) / [1.0, 0.8, 0.8, 0.8])
 
 
 @pytest.mark.parametrize(("stands_at", "is_named"), [(0.0, False), (0.01, True)])
@@ -293,20 +294,20 @@ def test_a_load_that_begins_to_rise_at_once_is_no_rest() -> None:
         load = one.conditions.load.copy()
         load[:20] = 0.1 * per_s * np.arange(20)
         one.conditions = Conditions(one.conditions.time_s, load, 0.1)
-        assert first_rests([one], MODEL, STANDARD).size == (5 if is_told else 0)
+        assert first_rests([one], MODEL, STANDARD).size == (6 if is_told else 0)
 
 
 def test_a_single_sample_of_a_slow_log_is_no_rest() -> None:
     """Nobody sees whether the load stood still there."""
     for count, is_told in ((1, False), (2, True)):
-        assert first_rests([_rested(count, step_s=1.8)], MODEL, STANDARD).size == (5 if is_told else 0)
+        assert first_rests([_rested(count, step_s=1.8)], MODEL, STANDARD).size == (6 if is_told else 0)
 
 
 def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
     """Four tenths of a second: four samples; and no more of it is looked at than of a hold that shows creep."""
     for count, is_told in ((3, False), (4, True)):
         found = first_rests([_rested(count)], MODEL, STANDARD)
-        assert found.shape == ((1, 5) if is_told else (0, 5))
+        assert found.shape == ((1, 6) if is_told else (0, 6))
     long = _rested(50)
     long.reading[30:] = 9.0
     (rest,) = first_rests([long], MODEL, STANDARD)
@@ -315,11 +316,11 @@ def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
     long.fitted[:27] = False
     assert first_rests([long], MODEL, STANDARD).size == 0
     long.fitted[26] = True
-    assert first_rests([long], MODEL, STANDARD).shape == (1, 5)
+    assert first_rests([long], MODEL, STANDARD).shape == (1, 6)
     ever = _rested(80)
     ever.resting[:] = True
     assert first_rests([ever], MODEL, STANDARD)[0, :3] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
-    assert first_rests([], MODEL, STANDARD).shape == (0, 5)
+    assert first_rests([], MODEL, STANDARD).shape == (0, 6)
     slow = _rested(2, step_s=10.0)
     slow.reading[1] = 9.0  # ten seconds on: no more than a single sample lies within a hold
     assert first_rests([slow], MODEL, STANDARD)[0, :3] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
@@ -334,7 +335,7 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
         command = np.concatenate([np.full(10, asked), np.linspace(1.0, -1000.0, 80)])
         one.recording = SimpleNamespace(command_n=command)
         found = first_rests([one], MODEL, STANDARD)
-        assert found.shape == ((1, 5) if is_told else (0, 5))
+        assert found.shape == ((1, 6) if is_told else (0, 6))
         if is_told:
             assert found[0, :2] == pytest.approx([0.3, 0.2 / 0.8])
     moved = _rested(30, level=0.3, reading=0.2)
@@ -347,7 +348,7 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     command = np.full(90, 500.0)
     command[0:12:3] = 0.0
     thin.recording = SimpleNamespace(command_n=command)
-    assert first_rests([thin], MODEL, STANDARD).shape == (1, 5)
+    assert first_rests([thin], MODEL, STANDARD).shape == (1, 6)
     command[0] = 500.0
     assert first_rests([thin], MODEL, STANDARD).size == 0
 
@@ -365,10 +366,10 @@ def test_the_mean_of_a_rest_is_known_as_well_as_its_noise_and_the_samples_that_w
     one = _rested(16)
     one.quiet, one.white_sd, one.thinned = SimpleNamespace(raw=0.01), 0.02, 4
     (rest,) = first_rests([one], MODEL, STANDARD)
-    assert rest[3:] == pytest.approx([0.01 / 8.0, 0.02 / 0.8 / 8.0])
+    assert rest[4:] == pytest.approx([0.01 / 8.0, 0.02 / 0.8 / 8.0])
     one.fitted[:12] = False
     (rest,) = first_rests([one], MODEL, STANDARD)
-    assert rest[3:] == pytest.approx([0.01 / 4.0, 0.02 / 0.8 / 4.0])
+    assert rest[4:] == pytest.approx([0.01 / 4.0, 0.02 / 0.8 / 4.0])
 
 
 def test_what_has_drifted_at_rest_is_taken_out_of_a_first_rest() -> None:
