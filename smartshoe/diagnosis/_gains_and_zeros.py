@@ -83,13 +83,15 @@ class _Gained:
 
     @property
     def is_conditioned(self) -> bool:
-        """Whether the wall's gain goes with load cycles by a law, as these do not account for.
+        """Whether a recording's gain changes again beside a law by which the wall's gain goes with load cycles.
 
-        When within its cycles a unit conditions no law knows: as a load turns, its gain may change at once as well. So
-        what changes within recordings beside that is no slip. A free form follows what goes with the time as well.
+        When within its cycles a unit conditions no law knows: as a load turns, its gain may change at once as well, and
+        does so again. So what changes again is no slip there; what changes once in a recording is. A free form follows
+        what goes with the time as well.
         """
         effects = (self.evidence.given.candidates[one].effect for one in self.kept)
-        return any(one.needs_cycles and one.place == "wall" and not one.is_flexible for one in effects)
+        by_cycles = any(one.needs_cycles and one.place == "wall" and not one.is_flexible for one in effects)
+        return by_cycles and any(len(one.gain_changes) > 1 for one in self.sessions)
 
     def searched(self) -> _Gained:
         """The same with the best set beside them."""
@@ -113,7 +115,7 @@ def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[S
     """The same sessions with gains of their own where these are told, else with what changes at moments; else None.
 
     Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise. Where the
-    wall still conditions beside these, they are how it does. A single recording has no gain of its own.
+    wall still conditions beside what changes again, that is how it does. A single recording has no gain of its own.
     """
     if any(one.gain_changes or one.zero_changes for one in sessions) or not may_differ(state, sessions):
         return None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from told_evidence import taken_for_exact
 
-from smartshoe import Recording
+from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _gains_and_zeros
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gains_and_zeros import (
@@ -236,6 +236,33 @@ def test_a_wall_that_conditions_as_its_load_turns_does_not_slip() -> None:
         state = state_at(fit(Likelihood(some, SD, start, STANDARD), start))
         told = with_likelier_gains(state, some) or some
         assert not any(one.gain_changes for one in told)
+
+
+@pytest.mark.parametrize("slips", [(0.0, 0.05, 0.0), (0.04, 0.05)])
+def test_a_wall_that_conditions_slips_where_its_gain_changes_once_in_a_recording(slips: tuple[float, ...]) -> None:
+    """Else it had no name, and its force on another recording was off by as much as the plain model's."""
+    conditioned = CURVED.with_part("cycle_conditioning", [0.15, 3.0, 0.0, 1.0])
+    time_s, moments_s = np.arange(0.0, 80.0, STEP_S), [21.0 + 20.0 * k for k in range(len(slips))]
+    runs = []
+    for k, slip in enumerate((*slips, 0.0)):
+        rng = np.random.default_rng([1, k])
+        corners = np.zeros(25)
+        corners[1::2] = rng.uniform(0.4, 1.0, 12)
+        load = np.interp(time_s, 80.0 / 24.0 * np.arange(25), corners)
+        share = conditioned.simulate(Conditions(time_s, load, STEP_S))
+        share = share * np.where(time_s >= [*moments_s, 0.0][k], 1.0 + slip, 1.0)
+        share = share + 0.5 * SD * rng.standard_normal(time_s.size)
+        runs.append(
+            Recording.from_arrays(
+                time_s=time_s, force_n=800.0 * load, pressure_mbar=SPAN_MBAR * share, name=f"run_{k}"
+            )
+        )
+    found = diagnose(runs[:-1], hold_out=runs[-1:])
+    assert {cause.name for cause in found.causes} == {"cycle_conditioning", "gas_compression"}
+    assert sum("as where a unit slips" in said for said in found.limits) == 1
+    assert found.baseline is not None
+    assert found.extended is not None
+    assert found.extended.force_rmse_n < 0.5 * found.baseline.force_rmse_n
 
 
 def test_a_gain_that_changes_without_load_is_told_within_the_stretch_that_does_not_show_it() -> None:
