@@ -195,8 +195,8 @@ def zeros_of(
         return ()
     rests = first_rests(sessions, model, thresholds)
     sensor, machine = shift_of("reading"), shift_of("load")
-    if not rests.size and is_gauge:
-        return _unseen(sessions, model, left, remembered, thresholds, rubbed)
+    if not rests.size:
+        return _unseen(sessions, model, left, remembered, thresholds, rubbed) if is_gauge else ()
     loads, readings, drifted, begun, *white = rests.T
     load_sd, reading_sd = (
         sd_of_a_mean(one, sds, thresholds) for one, sds in zip((loads, readings), white, strict=True)

@@ -137,6 +137,13 @@ def test_a_tare_is_told_of_any_sensor_where_a_command_says_that_nothing_presses(
         assert found["load_cell_tare"].value == pytest.approx(-tare, rel=0.1)
 
 
+def test_no_tare_is_told_of_a_unit_that_is_never_unloaded_by_command() -> None:
+    """A sensor in volts has no zero that a model could tell; a diagnosis of it ended in a division by nothing."""
+    loaded = _run(foot=0.1, offset=0.03, unit="v")
+    command_n = FULL_N * (0.1 + 0.9 * PRESSED)
+    assert _zeros(loaded.with_channel(replace(loaded.load, name="command", role="command", values=command_n))) == {}
+
+
 def test_a_unit_that_is_never_unloaded_leaves_open_which_zero_it_is() -> None:
     runs = [_run(foot=0.1, offset=0.1, seed=seed) for seed in range(3)]
     found = _zeros(*runs)
