@@ -253,9 +253,7 @@ def test_a_wall_that_conditions_slips_where_its_gain_changes_once_in_a_recording
         share = share * np.where(time_s >= [*moments_s, 0.0][k], 1.0 + slip, 1.0)
         share = share + 0.5 * SD * rng.standard_normal(time_s.size)
         runs.append(
-            Recording.from_arrays(
-                time_s=time_s, force_n=800.0 * load, pressure_mbar=SPAN_MBAR * share, name=f"run_{k}"
-            )
+            Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=SPAN_MBAR * share, name=f"run_{k}")
         )
     found = diagnose(runs[:-1], hold_out=runs[-1:])
     assert {cause.name for cause in found.causes} == {"cycle_conditioning", "gas_compression"}
