@@ -69,7 +69,7 @@ class ExtendedCompensator(ForceFilter):
         self.blocks = tuple(self._blocks)
         self.not_inverted = MappingProxyType(self._passed_over)
         self.cautions = MappingProxyType(self._cautions)
-        self.moved_in_an_hour = MappingProxyType(self._moved)
+        self.moved_by_the_clock = MappingProxyType(self._moved)
         self.lags_left_s = MappingProxyType(self._left_s)
         self.reset()
 
@@ -84,7 +84,7 @@ class ExtendedCompensator(ForceFilter):
         if isinstance(inverse, Memoryless) and math.isfinite(part.until_s):
             inverse = inverse.until(part.until_s)
         self._blocks.append((part.name, inverse))
-        moved = _moved_by_the_clock(inverse, self.started_s)
+        moved = _moved_by_the_clock(inverse, self.started_s, part.until_s)
         if moved:
             self._moved[part.name] = moved
             self._cautions[part.name] = _going_on(part, moved)
@@ -148,14 +148,16 @@ class ExtendedCompensator(ForceFilter):
         )
 
 
-def _moved_by_the_clock(inverse: Inverse, started_s: float) -> float:
+def _moved_by_the_clock(inverse: Inverse, started_s: float, until_s: float) -> float:
     """By what share of full scale a full-scale signal comes out otherwise an hour on, of what looks at the time alone.
 
-    What is summed up from the readings besides has no such share: it goes by them.
+    Of what is held from ``until_s`` on, from then on. What is summed up from the readings besides has no such share: it
+    goes by them.
     """
     if not isinstance(inverse, Memoryless):
         return 0.0
-    first, last = inverse.push(np.ones(2), np.array([started_s, started_s + HOUR_S])).tolist()
+    ends_s = until_s if math.isfinite(until_s) else started_s + HOUR_S
+    first, last = inverse.push(np.ones(2), np.array([started_s, ends_s])).tolist()
     return float(last - first)
 
 

@@ -173,7 +173,7 @@ def late_of(found: Compensation) -> list[str]:
 
 def held_of(found: Compensation, thresholds: Thresholds) -> list[str]:
     """What is said of drifts that a calibration holds as they are at the end of what was fitted."""
-    moved = found.filter.moved_in_an_hour
+    moved = found.filter.moved_by_the_clock
     held = [part for part in found.model.parts if math.isfinite(part.until_s)]
     held = [part for part in held if abs(moved.get(part.name, 0.0)) > thresholds.standing]
     if not held:

@@ -184,8 +184,8 @@ class ExtendedModel:
             if part is None:
                 signal = _through(core or self.core, signal, conditions)
             else:
-                given = self._around(conditions) if part.effect.bends_beside_arm else conditions.until(part.until_s)
-                signal = part.effect.apply(signal, given, part.values)
+                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
+                signal = part.effect.apply(signal, given.until(part.until_s), part.values)
                 refuse_other_size(part.name, signal, conditions.load.size)
         return self.gain * signal
 

@@ -303,6 +303,17 @@ def test_a_drift_that_is_held_is_undone_as_its_twin_simulates_it(name: str) -> N
     assert float(said[1].replace("−", "-")) == pytest.approx(moved, rel=0.05)
 
 
+def test_a_drift_that_is_held_after_hours_is_told_as_it_is_by_then() -> None:
+    """Of logs by the hour: what it does within the first hour is next to nothing of it."""
+    steady = BASELINE.with_part("zero_drift", [1e-6, 0.0, 0.0, 1.0])
+    by_hour, by_day = (ExtendedCompensator(steady.held_after(3600.0 * k, ()), 1.0) for k in (1, 24))
+    share = by_hour.moved_by_the_clock["zero_drift"]
+    assert by_day.moved_by_the_clock["zero_drift"] == pytest.approx(24.0 * share, rel=1e-9)
+    late = ExtendedCompensator(steady.held_after(60.0, ()), 1.0, started_s=100.0)  # held before the first reading
+    assert not late.moved_by_the_clock
+    assert not late.cautions
+
+
 def test_what_is_held_is_a_drift_and_stays_held() -> None:
     model = chain_of(["zero_drift", "gain_drift", "linear_leak"], 1)
     held = model.held_after(4.0, ("gain_drift",))

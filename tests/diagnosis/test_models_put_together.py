@@ -59,7 +59,7 @@ def test_a_calibration_takes_the_zero_of_what_its_filter_undoes(
     parts: Any, monkeypatch: pytest.MonkeyPatch, apart: float, has_own: bool
 ) -> None:
     """Of what it does not, as a zero that goes with the room, the mean is the zero's."""
-    late: Any = SimpleNamespace(not_inverted=("delay",), moved_in_an_hour={}, lags_left_s={})
+    late: Any = SimpleNamespace(not_inverted=("delay",), moved_by_the_clock={}, lags_left_s={})
     in_part = Compensation([FINE], MODEL.with_part("delay"), EXTENDED_N, PLAIN_N, EXTENDED_N, late)
     undone = in_part.undone
     assert undone.names == MODEL.names

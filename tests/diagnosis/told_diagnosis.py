@@ -22,7 +22,7 @@ SCREENED = ("delay", "flexible_lag", "linear_leak", "dead_band", "rate_gain", "w
 SCREENING = tuple((name, float(k)) for k, name in enumerate(SCREENED))
 FINE: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.05))
 PLAIN_N, EXTENDED_N = ForceError(8.0, 9.0), ForceError(6.0, 7.0)
-FILTER: Any = SimpleNamespace(not_inverted=(), moved_in_an_hour={}, lags_left_s={})  # undoes all
+FILTER: Any = SimpleNamespace(not_inverted=(), moved_by_the_clock={}, lags_left_s={})  # undoes all
 
 
 @dataclass(frozen=True)

@@ -290,6 +290,11 @@ def _undone_by(undo: Any) -> Effect:
     return _wrong(inverse=lambda self, values, step_s: Memoryless(undo, "x = x;"))
 
 
+def _with_a_memory(self: Effect, values: Array, step_s: float) -> Any:
+    loop = effect("play_hysteresis")
+    return loop.inverse(loop.begun(), step_s)
+
+
 def _needing_a_thermometer(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Array:
     return signal + values[0] * conditions.temperature_k  # type: ignore[operator]
 
@@ -320,6 +325,7 @@ STRENGTH = Crease.parameters[0]
         (_wrong(apply=_in_place), "read-only"),
         (_wrong(inverse=_with_a_bug), "fails .*gauge"),
         (_wrong(inverse=lambda self, values, step_s: 5), "gives 5, which is neither an Inverse nor None"),
+        (_wrong(is_drift=True, inverse=_with_a_memory), "is_drift needs a Memoryless inverse, which can be held"),
         (_undone_by(lambda signal, time_s: 1 / 0), "fails .ZeroDivisionError"),
         (_undone_by(lambda signal, time_s: signal[:-1]), r"inverse's push gives values of shape \(31,\)"),
         (_undone_by(lambda signal, time_s: signal.astype("f4")), "inverse's push gives float32"),
@@ -444,3 +450,19 @@ def test_every_curve_says_that_it_is_one() -> None:
             one.apply(of, Conditions(0.01 * np.arange(200), of, 0.01), values) for of in (load, load[shuffled])
         )
         assert one.is_memoryless == np.allclose(reading[shuffled], other, rtol=0.0, atol=1e-9), one.name
+
+
+def test_a_drift_is_held_whatever_it_bends_beside() -> None:
+    """A spring beside the arm, of another package, that gives way with the time."""
+
+    def aged(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Array:
+        return np.asarray(signal * (1.0 + values[0] * conditions.time_s))
+
+    ageing = _wrong(name="ageing", apply=aged, is_drift=True, bends_beside_arm=True)
+    model = ExtendedModel(1.0, 0.1, 0.2, 800.0, 140.0, "mbar").with_part(ageing, [0.01]).held_after(4.0, ())
+    conditions = Conditions(np.arange(50.0), np.full(50, 0.5), 1.0)
+    apart = [
+        model.simulate(replace(conditions, time_s=time_s))
+        for time_s in (conditions.time_s, np.minimum(conditions.time_s, 4.0))
+    ]
+    np.testing.assert_array_equal(*apart)

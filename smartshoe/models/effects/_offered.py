@@ -15,6 +15,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.models.effects._sensor_evidence import NoiseEffect, SensorEvidence
+from smartshoe.models.effects._sensor_inverse import Memoryless
 from smartshoe.models.effects.effect import (
     PLACES,
     ChainContext,
@@ -187,6 +188,8 @@ def _try_inverse(made: Effect, values: Array, at: Conditions, output: Array) -> 
         return
     if not isinstance(undone, Inverse):
         raise TypeError(f"inverse gives {undone!r}, which is neither an Inverse nor None")
+    if made.is_drift and not isinstance(undone, Memoryless):
+        raise TypeError("is_drift needs a Memoryless inverse, which can be held where nothing tells how it goes on")
 
     def pushed(part: slice) -> Array:
         signal = output[part].copy()

@@ -197,7 +197,7 @@ class Effect(ABC):
     ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
     ``between_clocks``: "lag" or "rate" where the one value of a latency is what two clocks differ by.
     ``is_drift``: True where it goes on with the time since the session began, whatever the load; on a stream it is
-    undone by a `Memoryless` inverse.
+    undone by a `Memoryless` inverse, if at all.
     ``is_leak``: True where air leaves the tube, so that an inverse sums up what is gone from the readings.
     ``clips``: a reading that it moves tells no load any more.
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
