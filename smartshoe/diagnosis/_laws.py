@@ -82,10 +82,11 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
 def _with_another_curve(found: Fit, about: Evidence, own: Posterior) -> list[Fit]:
     """A fit with one more curve beside its own, of another branch, where the linearisation does not speak against it.
 
-    The search has one curve in a set: each bends for the other, which only fits of both can tell.
+    The search has one curve in a set: each bends for the other, which only fits of both can tell. Of a curve of free
+    form nothing is told that it would not follow.
     """
     candidates = about.given.candidates
-    there = [candidates[m] for m in own.members]
+    there = [candidates[m] for m in own.members if not candidates[m].effect.is_flexible]
     slots, branches = {one.slot for one in there}, {one.branch for one in there}
     shapes: dict[Effect, list[Mapping[str, float]]] = {}
     for score, k, strengths in sorted(about.extensions(own.members), key=lambda extension: extension[0]):

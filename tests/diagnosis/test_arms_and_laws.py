@@ -13,8 +13,16 @@ from told_evidence import STANDARD
 from smartshoe.diagnosis import _arms, _laws, _settling
 from smartshoe.diagnosis._arms import arms_of, effect_count
 from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
-from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, _with_a_branch_each, likelier, with_laws
+from smartshoe.diagnosis._laws import (
+    _is_stretched,
+    _replaced_with,
+    _with_a_branch_each,
+    _with_another_curve,
+    likelier,
+    with_laws,
+)
 from smartshoe.diagnosis._members import Alternative
+from smartshoe.diagnosis._sensitivity import Candidate
 from smartshoe.models.effects import blocks, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -272,6 +280,23 @@ def test_a_unit_has_one_curve_of_each_branch() -> None:
     sets = [("wall_hardening", "saturation", "zero_offset"), ("wall_hardening", "contact_area"), ("contact_area",)]
     fits: Any = [SimpleNamespace(model=SimpleNamespace(names=names)) for names in sets]
     assert [one.model.names for one in _with_a_branch_each(fits, candidates)] == [sets[0], sets[2]]
+
+
+@pytest.mark.parametrize(
+    ("curve", "beside"), [("wall_hardening", ["saturation"]), ("flexible_curve", []), ("saturation", [])]
+)
+def test_a_curve_of_another_branch_is_tried_beside_a_law_and_not_beside_a_free_form(
+    monkeypatch: pytest.MonkeyPatch, curve: str, beside: list[str]
+) -> None:
+    """A free form of several pieces was told an end of the range, and its law was half sure for that."""
+    stop = effect("saturation")
+    there = effect(curve) if curve in catalogue() else next(b for b in blocks()["static_curve"] if b.name == curve)
+    given: Any = SimpleNamespace(candidates=[Candidate(there, {}, (1,)), Candidate(stop, {"level": 0.9}, (2, 3))])
+    about: Any = SimpleNamespace(given=given, extensions=lambda members: [(5.0, 1, np.array([0.1, 0.1]))])
+    monkeypatch.setattr(_laws, "fit_with", lambda law, model, likelihood, shapes: (law.name, shapes))
+    found: Any = SimpleNamespace(model=None, likelihood=None)
+    tried: Any = _with_another_curve(found, about, SimpleNamespace(members=(0,), score=10.0))  # type: ignore[arg-type]
+    assert tried == [(name, [{"level": 0.9}]) for name in beside]
 
 
 def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
