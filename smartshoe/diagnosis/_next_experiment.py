@@ -204,14 +204,18 @@ def _is_of(protocol: Protocol, session: Session, peak_n: float, same: float) -> 
 
 
 def _contest(found: Inference, cause: Cause, rival: str) -> Contest:
-    """A cause and its rival as they were fitted, or, of those that were not, as they are fitted now."""
+    """A cause and its rival as they were fitted, or, of those that were not, as they are fitted now.
+
+    Beside both what is a drift is held alike: they are told apart by loads that last for longer.
+    """
     (member,) = (one for one in found.members if one.name == cause.part)
     fits = {one.effect: one.fit for one in (*member.laws, *member.untold)}
 
     def fitted(name: str) -> Fit:
         if name == member.name:
             return found.fit
-        return fits.get(name) or _in_place_of(found, member.name, name)
+        one = fits.get(name) or _in_place_of(found, member.name, name)
+        return replace(one, model=one.model.held_as(found.fit.model))
 
     return Contest(fitted(cause.name), fitted(rival), member.without).settled()
 

@@ -220,8 +220,9 @@ def _held(model: ExtendedModel, named: Chosen, sessions: Sequence[Session]) -> E
 
     A free form is none either, whatever its kind is named.
     """
-    ends_s = [one.conditions.before.get("time_s", 0.0) + one.conditions.time_s[-1] for one in fitted_of(sessions)]
-    return model.held_after(float(max(ends_s)), {name.effect.name for name in named.names})
+    fitted = ((one.conditions, one.conditions.time_s[one.fitted]) for one in fitted_of(sessions))
+    ends_s = max(at.before.get("time_s", 0.0) + float(time_s[-1]) for at, time_s in fitted)
+    return model.held_after(ends_s, {name.effect.name for name in named.names})
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import run_on
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
+from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
 from smartshoe.diagnosis._next_experiment import _contest, _fastest_n_per_s, _in_place_of, _is_of, next_experiment
@@ -458,22 +459,28 @@ def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and
 def test_a_contest_is_of_what_was_fitted_and_of_what_is_fitted_in_a_blocks_place(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, part, law: (part, law))
+    """Drifts that are held beside the cause are held beside its rival: else a long protocol tells them apart by it."""
+
+    def fitted(what: str) -> Any:
+        return Fit(SimpleNamespace(held_as=lambda whole: f"{what}, held as {whole}"), 0.0, None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, part, law: fitted(f"{law} for {part}"))
     monkeypatch.setattr(Contest, "settled", lambda self: self)
-    laws = (Alternative("contact_area", 3.0, "fitted contact"), Alternative("dead_band", 4.0, "fitted band"))  # type: ignore[arg-type]
-    untold = (Alternative("zero_drift", 5.0, "fitted drift"),)  # type: ignore[arg-type]
+    laws = (Alternative("contact_area", 3.0, fitted("contact")), Alternative("dead_band", 4.0, fitted("band")))
+    untold = (Alternative("zero_drift", 5.0, fitted("drift")),)
     members = [
         SimpleNamespace(name=name, laws=laws, untold=untold, without=f"without {name}")
         for name in ("other", "flexible_curve", "gas_compression")
     ]
-    found: Any = SimpleNamespace(fit="whole", members=members)
+    found: Any = SimpleNamespace(fit=SimpleNamespace(model="whole"), members=members)
     for name, part, rival, expected in (
-        ("contact_area", "flexible_curve", "dead_band", ("fitted contact", "fitted band")),
-        ("contact_area", "flexible_curve", "saturation", ("fitted contact", ("flexible_curve", "saturation"))),
-        ("gas_compression", "gas_compression", "zero_drift", ("whole", "fitted drift")),
+        ("contact_area", "flexible_curve", "dead_band", ("contact", "band")),
+        ("contact_area", "flexible_curve", "saturation", ("contact", "saturation for flexible_curve")),
+        ("gas_compression", "gas_compression", "zero_drift", ("", "drift")),
     ):
         contest = _contest(found, _cause(name, 0.02, (rival,), part=part), rival)
-        assert (contest.cause, contest.rival, contest.without) == (*expected, f"without {part}")
+        as_told = tuple(f"{one}, held as whole" if one else "whole" for one in expected)
+        assert (contest.cause.model, contest.rival.model, contest.without) == (*as_told, f"without {part}")
 
 
 # -- names ------------------------------------------------------------------------------------------------------------

@@ -174,6 +174,8 @@ def test_a_drift_that_is_no_named_law_is_held_from_the_end_of_what_was_fitted_on
     assert {part.name: part.until_s for part in held.parts} == {
         "gain_drift": one.conditions.time_s[-1], "zero_drift": math.inf, "linear_leak": math.inf,
     }  # fmt: skip
+    last = replace(one, held_out=np.arange(one.reading.size) >= 100)  # a load cycle that judges
+    assert _held(drifting, named, [last]).part("gain_drift").until_s == one.conditions.time_s[99]
     carried_on = replace(one, conditions=replace(one.conditions, before={"time_s": 50.0}))
     held = _held(drifting, named, [one, carried_on])
     assert held.part("gain_drift").until_s == 50.0 + one.conditions.time_s[-1]
