@@ -73,9 +73,9 @@ def apart_s(
     found = {} if told.shared else _of_first({place: runs[place] for place in first}, lags, thresholds)
     if found:  # foretold at other loads than the others had: one unit must follow all of them better by these lags
         moved = [runs[place].earlier(found.get(place, 0.0)) for place in first]
-        for clock in (None, told.perhaps):
-            if _left([runs[place].on(clock) for place in first]) <= _left(moved):
-                found = {}
+        by_one_clock = ([runs[place].on(clock) for place in first] for clock in (None, told.perhaps))
+        if min(_left(one) for one in by_one_clock) <= _left(moved):
+            found = {}
     known = [runs[place].earlier(found.get(place, 0.0)).products for place in first]
     later = [*(k for k in told_last if k < told.fitted), *(k for k in runs if k >= told.fitted)]
     for place in later:

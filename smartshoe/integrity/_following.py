@@ -79,8 +79,8 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
 def _is_noise(view: View) -> bool:
     """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp.
 
-    One that goes anywhere within a sample is none where most of its variance is none of its steps', as that of a drive
-    that is off for hours: noise is as far from its last value as from any other (von Neumann 1941).
+    And at least half of its variance is in its steps (von Neumann 1941): noise is as far from its last value as from
+    any other, a drive that is anywhere within a sample, but off for hours, is not.
     """
     load = view.load.values
     if view.load_span > 2.0 * view.load.largest * view.load.quiet_noise:
