@@ -107,8 +107,8 @@ EXPERIMENTS: Mapping[str, Callable[[float], Protocol]] = {
 def paced(protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Protocol:
     """The same so slowly that a log of a sample every ``sample_time_s`` shows it; itself where that does already.
 
-    It holds a ``few`` samples of each hold, and of a ramp from no load to the peak at the fastest rate, but for loads
-    that are changed at once, and of all of it as many as tell anything; but it lasts no longer than any may.
+    The log then has a ``few`` samples of each hold, and of a ramp over all the load at the fastest rate, but for loads
+    that are changed at once, and as many of all of it as tell anything; but it lasts no longer than any protocol may.
     """
     least_s, at_n = protocol.duration_s * thresholds.few / thresholds.least_samples, 0.0
     for one in protocol.segments:
