@@ -259,6 +259,17 @@ def in_a_tare_of(
     )
 
 
+def as_the_cell_shows_of(zeros: Sequence[Zero], scale: Scale) -> tuple[str, ...]:
+    """What is said of the force that a calibration gives, where the load cell that it was made by has a tare."""
+    return tuple(
+        "a calibration gives the force as the load cell shows it,"
+        f" {abs(tare.value) * scale.load_n:.3g} N {'more' if tare.value < 0.0 else 'less'} than what presses (take the"
+        " tare off the loads for one that does not)"
+        for tare in zeros
+        if tare.effect.shifts == "load"
+    )
+
+
 def crept_of(drift: Name, tare: Zero | None) -> str | None:
     """What is said of a drift of the zero that a tare may make by creeping, where there is one."""
     if tare is None:

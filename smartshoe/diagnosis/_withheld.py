@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._limits import (
+    as_the_cell_shows_of,
     crept_of,
     departure_of,
     few_cycles_of,
@@ -70,7 +71,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
     seen = Chosen(names, kept, (*before, *seen.limits), seen.nameless, (*past, *led))
     seen = seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
     of_tare = in_a_tare_of(kept, [one.effect for one in seen.names], given.scale, thresholds)
-    return replace(seen, of_zeros=(*seen.of_zeros, *of_tare))
+    return replace(seen, of_zeros=(*seen.of_zeros, *as_the_cell_shows_of(kept, given.scale), *of_tare))
 
 
 def _shown(found: Inference, given: Prepared, left: float) -> Chosen:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis import Thresholds, diagnose
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._held_out import residual_of
@@ -135,6 +135,18 @@ def test_a_tare_is_told_of_any_sensor_where_a_command_says_that_nothing_presses(
     assert [one.effect.name for one in found.values()] == ["load_cell_tare"] * bool(tare)
     if tare:
         assert found["load_cell_tare"].value == pytest.approx(-tare, rel=0.1)
+
+
+@pytest.mark.parametrize(("tare", "way"), [(0.03, "24 N more"), (-0.02, "16 N less")])
+def test_a_calibration_beside_a_tare_is_said_to_give_the_force_as_the_load_cell_shows_it(tare: float, way: str) -> None:
+    """And it does: off by the tare from what presses, which nothing had said."""
+    runs = [_run(tare=tare, seed=seed) for seed in range(3)]
+    found = diagnose(runs[:2], hold_out=runs[2:])
+    assert [cause.name for cause in found.causes] == ["load_cell_tare"]
+    (said,) = found.limits_of_the_force
+    assert f"as the load cell shows it, {way} than what presses" in said
+    force_n = found.calibration(unit="tared").compensator(1.0 / STEP_S).apply(runs[2])
+    assert np.mean(force_n - FULL_N * PRESSED) == pytest.approx(FULL_N * tare, rel=0.05)
 
 
 def test_no_tare_is_told_of_a_unit_that_is_never_unloaded_by_command() -> None:
