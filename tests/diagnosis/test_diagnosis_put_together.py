@@ -30,7 +30,9 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert told.explained_percent == pytest.approx(75.0)
     assert (told.rivals, told.next_experiment) == (("rival of delay",), "next")
     assert told.likeness is parts.found.likeness
-    assert (told.limits, told.leftover, told.screening) == (("limit", "it turned"), None, parts.found.screening)
+    (tare,) = told.limits_of_the_force
+    assert "160 N less than what presses" in tare
+    assert (told.limits, told.leftover, told.screening) == (("limit", tare, "it turned"), None, parts.found.screening)
     assert (told.model, told.rejected, told.parameters) == ("with offset", None, {"p": 1})
     assert told.baseline_model.to_dict() == replace(MODEL, noise=parts.off).to_dict()
     assert (told.covariance, told.traces, told.thresholds) == (((1.0,),), ("trace",), STANDARD)
