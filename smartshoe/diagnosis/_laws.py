@@ -68,7 +68,7 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
         return
     about, own = evidence_about(found.model, evidence)
     if has_curve:
-        tried = [*_with_a_branch_each(tried, about.given.candidates), *_with_another_curve(found, about, own)]
+        tried = [*_with_a_branch_each(tried, about.given.candidates), *_with_another_curve(found, about, own, members)]
     changed = []
     for fitted in tried:
         if evidence_about(fitted.model, evidence, about.given)[1].score >= own.score:
@@ -79,14 +79,14 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
     yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
 
 
-def _with_another_curve(found: Fit, about: Evidence, own: Posterior) -> list[Fit]:
+def _with_another_curve(found: Fit, about: Evidence, own: Posterior, members: Sequence[Member]) -> list[Fit]:
     """A fit with one more curve beside its own, of another branch, where the linearisation does not speak against it.
 
-    The search has one curve in a set: each bends for the other, which only fits of both can tell. Of a curve of free
-    form nothing is told that it would not follow.
+    The search has one curve in a set: each bends for the other, which only fits of both can tell. A curve of free form
+    bends for any, so that its nearest laws stand in its place.
     """
     candidates = about.given.candidates
-    there = [candidates[m] for m in own.members if not candidates[m].effect.is_flexible]
+    there = [candidates[m] for m in own.members]
     slots, branches = {one.slot for one in there}, {one.branch for one in there}
     shapes: dict[Effect, list[Mapping[str, float]]] = {}
     for score, k, strengths in sorted(about.extensions(own.members), key=lambda extension: extension[0]):
@@ -95,7 +95,14 @@ def _with_another_curve(found: Fit, about: Evidence, own: Posterior) -> list[Fit
             continue
         if one.slot in slots and one.branch not in branches:
             shapes.setdefault(one.effect, []).append(one.shape)
-    return [fit_with(law, found.model, found.likelihood, few[:RIVALS]) for law, few in shapes.items()]
+    free = (one for one in members if one.effect.is_memoryless and one.effect.is_flexible)
+    beside = [a.fit.model for one in free for a in one.laws[:RIVALS] if a.fit is not None] or [found.model]
+    return [
+        fit_with(law, model, found.likelihood, few[:RIVALS])
+        for law, few in shapes.items()
+        for model in beside
+        if law.name not in model.names
+    ]
 
 
 def _with_a_branch_each(fits: Sequence[Fit], candidates: Sequence[Candidate]) -> Iterator[Fit]:

@@ -283,9 +283,10 @@ def test_a_unit_has_one_curve_of_each_branch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("curve", "beside"), [("wall_hardening", ["saturation"]), ("flexible_curve", []), ("saturation", [])]
+    ("curve", "beside"),
+    [("wall_hardening", ["found"]), ("flexible_curve", ["first", "second"]), ("saturation", [])],
 )
-def test_a_curve_of_another_branch_is_tried_beside_a_law_and_not_beside_a_free_form(
+def test_a_curve_of_another_branch_is_tried_beside_a_law_and_laws_in_the_place_of_a_free_form(
     monkeypatch: pytest.MonkeyPatch, curve: str, beside: list[str]
 ) -> None:
     """A free form of several pieces was told an end of the range, and its law was half sure for that."""
@@ -293,10 +294,19 @@ def test_a_curve_of_another_branch_is_tried_beside_a_law_and_not_beside_a_free_f
     there = effect(curve) if curve in catalogue() else next(b for b in blocks()["static_curve"] if b.name == curve)
     given: Any = SimpleNamespace(candidates=[Candidate(there, {}, (1,)), Candidate(stop, {"level": 0.9}, (2, 3))])
     about: Any = SimpleNamespace(given=given, extensions=lambda members: [(5.0, 1, np.array([0.1, 0.1]))])
-    monkeypatch.setattr(_laws, "fit_with", lambda law, model, likelihood, shapes: (law.name, shapes))
-    found: Any = SimpleNamespace(model=None, likelihood=None)
-    tried: Any = _with_another_curve(found, about, SimpleNamespace(members=(0,), score=10.0))  # type: ignore[arg-type]
-    assert tried == [(name, [{"level": 0.9}]) for name in beside]
+    monkeypatch.setattr(_laws, "fit_with", lambda law, model, likelihood, shapes: (law.name, model.is_of, shapes))
+
+    def fitted(is_of: str, *names: str) -> Any:
+        return SimpleNamespace(model=SimpleNamespace(names=names, is_of=is_of), likelihood=None)
+
+    laws = [Alternative("first", 1.0, fitted("first")), Alternative("second", 2.0, fitted("second"))]
+    member: Any = SimpleNamespace(effect=there, laws=[*laws, Alternative("third", 3.0, fitted("third"))])
+    own: Any = SimpleNamespace(members=(0,), score=10.0)
+    tried: Any = _with_another_curve(fitted("found", curve), about, own, [member])
+    assert tried == [("saturation", is_of, [{"level": 0.9}]) for is_of in beside]
+    ended = SimpleNamespace(effect=there, laws=[Alternative("saturation", 1.0, fitted("an end", "saturation"))])
+    if there.is_flexible:  # none beside itself
+        assert _with_another_curve(fitted("found", curve), about, own, [ended]) == []  # type: ignore[list-item]
 
 
 def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
