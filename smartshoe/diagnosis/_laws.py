@@ -68,7 +68,8 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
         return
     about, own = evidence_about(found.model, evidence)
     if has_curve:
-        tried = [*_with_a_branch_each(tried, about.given.candidates), *_with_another_curve(found, about, own, members)]
+        tried += _with_another_curve(found, about, own, members)
+        tried = [*_with_a_branch_each(tried, about.given.candidates)]
     changed = []
     for fitted in tried:
         if evidence_about(fitted.model, evidence, about.given)[1].score >= own.score:
@@ -82,8 +83,9 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Itera
 def _with_another_curve(found: Fit, about: Evidence, own: Posterior, members: Sequence[Member]) -> list[Fit]:
     """A fit with one more curve beside its own, of another branch, where the linearisation does not speak against it.
 
-    The search has one curve in a set: each bends for the other, which only fits of both can tell. A curve of free form
-    bends for any, so that its nearest laws stand in its place.
+    The search has one curve in a set: each bends for the other, which only fits of both can tell, also with the nearest
+    laws in its place; only so for a curve of free form, which bends for any. Evidence lets an equation depart in a few
+    directions; from these it departs again, by the square of that share of its size, which is no other curve.
     """
     candidates = about.given.candidates
     there = [candidates[m] for m in own.members]
@@ -95,14 +97,17 @@ def _with_another_curve(found: Fit, about: Evidence, own: Posterior, members: Se
             continue
         if one.slot in slots and one.branch not in branches:
             shapes.setdefault(one.effect, []).append(one.shape)
-    free = (one for one in members if one.effect.is_memoryless and one.effect.is_flexible)
-    beside = [a.fit.model for one in free for a in one.laws[:RIVALS] if a.fit is not None] or [found.model]
-    return [
-        fit_with(law, model, found.likelihood, few[:RIVALS])
+    curves = [one for one in members if one.effect.is_memoryless]
+    beside = [] if any(one.effect.is_flexible for one in curves) else [found]
+    beside += [a.fit for one in curves for a in one.laws[:RIVALS] if a.fit is not None]
+    tried = [
+        (one, fit_with(law, one.model, found.likelihood, few[:RIVALS]))
         for law, few in shapes.items()
-        for model in beside
-        if law.name not in model.names
+        for one in beside
+        if law.name not in one.model.names
     ]
+    least = about.thresholds.departure**4 * max(one.fall for one in curves)
+    return [both for one, both in tried if one.cost - both.cost > least]
 
 
 def _with_a_branch_each(fits: Sequence[Fit], candidates: Sequence[Candidate]) -> Iterator[Fit]:

@@ -73,7 +73,6 @@ def names_of(
     for one in sorted(likely, key=lambda one: (one.is_sure, one.member.size), reverse=True):
         first.setdefault(one.effect.name, one)
     likely = [one for one in likely if first[one.effect.name] is one]
-    likely = [one for one in likely if not _departs_by_it(likely, one.member, thresholds)]
     found = {one.effect.name for one in likely}  # what is there itself stands for no other
     likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
     odds = thresholds.equivalent_odds
@@ -90,16 +89,6 @@ def names_of(
         return ()
     by_itself = (one for one in possible if one.member.effect.kind == alone.kind)
     return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
-
-
-def _departs_by_it(names: Sequence[Name], curve: Member, thresholds: Thresholds) -> bool:
-    """Whether a curve is as small as what another one of its kind departs by, beyond what evidence lets it depart by.
-
-    Its equation may depart in a few directions, and what is there departs from these again.
-    """
-    kind, others = curve.effect.kind, (one.member for one in names)
-    sizes = [one.size for one in others if one.effect.is_memoryless and one.effect.kind == kind]
-    return curve.effect.is_memoryless and curve.size < thresholds.departure**2 * max(sizes, default=0.0)
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:

@@ -203,7 +203,8 @@ def zeros_of(
     )
     as_read_sd = float(np.hypot(reading_sd, wanders / np.sqrt(len(rests))))
     reading_sd = float(np.hypot(as_read_sd, thresholds.departure * np.mean(np.abs(drifted))))
-    load, reading, undone = (float(np.mean(one)) for one in (loads, readings, readings + begun))
+    load, reading = (float(np.mean(one)) for one in (loads, readings))
+    as_read = [float(np.mean(readings + one)) for one in (drifted, begun)]
     many = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
     if is_gauge and abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
@@ -212,7 +213,7 @@ def zeros_of(
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
     is_clear[1] &= is_gauge and abs(reading) <= thresholds.foreign_zero  # else it is a convention of the sensor's
     # One that only undoes a drift is that drift's error; one that undoes a past, where what fades began: a drift began.
-    is_clear[1] &= abs(undone) >= many * as_read_sd
+    is_clear[1] &= as_read[0] * as_read[1] > 0.0 and min(map(abs, as_read)) >= many * as_read_sd
     borne = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):
         return (Zero(sensor, borne, reading_sd, abs(borne), (machine.name,), True),)  # no cause more is needed

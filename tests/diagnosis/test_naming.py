@@ -203,15 +203,6 @@ def test_a_block_beside_the_law_that_is_its_nearest_is_that_laws_departure_and_n
     assert name.member is beside  # the larger, of two that are sure
 
 
-@pytest.mark.parametrize(("share", "is_named"), [(0.9, False), (1.1, True)])
-def test_a_second_curve_is_named_that_is_more_than_the_first_departs_by_again(share: float, is_named: bool) -> None:
-    small = share * STANDARD.departure**2 * 0.02
-    bent, ended = member("wall_hardening", size=0.02, fall=1e5), member("saturation", size=small, fall=1e3)
-    beside = member("delay", size=small, fall=1e3)  # no curve
-    named = [one.effect.name for one in names_of((bent, ended, beside), 0.0, STANDARD)]
-    assert named == ["wall_hardening", *["saturation"] * is_named, "delay"]
-
-
 def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_well() -> None:
     """A dead band of a third of full scale is a curve like any other; one of its own kind is a dead band."""
     laws = (("sensor_nonlinearity", 20.0), ("gas_compression", 60.0))
