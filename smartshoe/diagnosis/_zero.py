@@ -202,12 +202,15 @@ def zeros_of(
         sd_of_a_mean(one, sds, thresholds) for one, sds in zip((loads, readings), white, strict=True)
     )
     as_read_sd = float(np.hypot(reading_sd, wanders / np.sqrt(len(rests))))
-    reading_sd = float(np.hypot(as_read_sd, thresholds.departure * np.mean(np.abs(drifted))))
+    drift_sd = thresholds.departure * float(np.mean(np.abs(drifted)))
+    # Whether the reading agrees with the load several rests tell by how they scatter.
+    borne_sd = float(np.linalg.norm([load_sd, drift_sd, reading_sd if len(rests) > 1 else as_read_sd]))
+    reading_sd = float(np.hypot(as_read_sd, drift_sd))
     load, reading = (float(np.mean(one)) for one in (loads, readings))
     as_read = [float(np.mean(readings + one)) for one in (drifted, begun)]
     many = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
-    if is_gauge and abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
+    if is_gauge and abs(reading - load) < many * borne_sd:
         return ()  # the reading agrees with the load, and the unit bears it
     if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own

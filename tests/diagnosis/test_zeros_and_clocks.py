@@ -263,6 +263,14 @@ def test_an_offset_within_what_wanders_is_none() -> None:
     assert quieter.sd == pytest.approx(np.hypot(known.sd, one_look_each), rel=1e-6)
 
 
+def test_a_tare_is_told_where_several_rests_read_nothing_whatever_wanders_elsewhere() -> None:
+    sessions, scale = _sessions(_run(tare=-0.01, seed=1), _run(tare=-0.01, seed=2))
+    model = baseline_of(sessions, scale)
+    for some, told in ((sessions, ["load"]), (sessions[:1], [])):
+        found = zeros_of(some, model, scale, 0.0, 0.0, STANDARD, 0.01)
+        assert [one.effect.shifts for one in found] == told
+
+
 def test_each_recordings_own_offset_is_found_under_a_model() -> None:
     sessions, scale = _sessions(_run(offset=0.02, seed=1), _run(offset=-0.04, seed=2), _run(offset=0.1, seed=3))
     found = offsets(sessions, baseline_of(sessions, scale))
