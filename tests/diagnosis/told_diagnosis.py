@@ -60,7 +60,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         likeness=np.eye(6), own_gains=(), zero_changes=(), nearest=None,
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
-    kinds[2].memory, kinds[2].size = "memory", 0.07
+    kinds[2].memory, kinds[2].size, kinds[2].wanders = "memory", 0.07, lambda lasts_s: ("wanders", lasts_s)
     made = SimpleNamespace(
         given=given,
         found=found,
