@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
 from smartshoe.diagnosis._members import Alternative, Member, fit_with
-from smartshoe.diagnosis._search import RIVALS, SWAPS
+from smartshoe.diagnosis._search import RIVALS, SWAPS, has_its_sign
 from smartshoe.diagnosis._sensitivity import Candidate, available
 from smartshoe.diagnosis._state import State, evidence_about, fit_of, state_at
 from smartshoe.models.effects import Effect, blocks
@@ -93,7 +93,7 @@ def _with_another_curve(found: Fit, about: Evidence, own: Posterior, members: Se
     shapes: dict[Effect, list[Mapping[str, float]]] = {}
     for score, k, strengths in sorted(about.extensions(own.members), key=lambda extension: extension[0]):
         one = candidates[k]
-        if score >= own.score or one.effect.is_flexible or (len(strengths) == 1 and not one.has_sign_of(strengths)):
+        if score >= own.score or one.effect.is_flexible or not has_its_sign(about, k, strengths):
             continue
         if one.slot in slots and one.branch not in branches:
             shapes.setdefault(one.effect, []).append(one.shape)

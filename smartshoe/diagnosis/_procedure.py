@@ -82,9 +82,10 @@ def diagnosed(
     left = _left_by(found, given, integrity.faults)
     named = _named(found, given, left)
     held = _held(found.fit.model, named, sessions)
-    if held is not found.fit.model:
+    if held is not found.fit.model:  # what was fitted, and by what the names go, is as it was
         found = replace(found, fit=replace(found.fit, model=held))
-        left = _left_by(found, given, integrity.faults)
+        after, _, off_after = _left_of(held, given)
+        left = replace(left, after=after, off_after=off_after)
     plain = replace(found.baseline.model, noise=fitted_rms(fine, left.off_before))
     extended = replace(found.fit.model, noise=fitted_rms(fine, left.off_after))
     baseline, best = errors(fine, plain), errors(fine, extended)
@@ -190,16 +191,18 @@ class _LeftOver:
 
 
 def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _LeftOver:
-    sessions, thresholds = given.sessions, given.thresholds
-    models = found.baseline.model, found.fit.model
-    plain, residuals = ([residual_of(one, model) for one in sessions] for model in models)
-    off = [[residual_of(one, model) for one in given.fine] for model in models]
-    before, after = (
-        residual_structure(sessions, left, thresholds, repeating(given.fine, at_full_rate, thresholds))
-        for left, at_full_rate in zip((plain, residuals), off, strict=True)
-    )
-    within = _left_of_what_was_fitted(sessions, residuals, thresholds)
-    return _LeftOver(before, after, within, known_error(faults, sessions, given.scale), *off)
+    sessions = given.sessions
+    before, _, off_before = _left_of(found.baseline.model, given)
+    after, residuals, off_after = _left_of(found.fit.model, given)
+    within = _left_of_what_was_fitted(sessions, residuals, given.thresholds)
+    return _LeftOver(before, after, within, known_error(faults, sessions, given.scale), off_before, off_after)
+
+
+def _left_of(model: ExtendedModel, given: Prepared) -> tuple[ResidualStructure, list[Array], list[Array]]:
+    """What a model leaves: the structure in it, residuals (n,) of each recording, and these at the full rate."""
+    residuals, off = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
+    quick = repeating(given.fine, off, given.thresholds)
+    return residual_structure(given.sessions, residuals, given.thresholds, quick), residuals, off
 
 
 def _is_silent(found: Inference, given: Prepared) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 
 # Resolutions of the search: half and twice of each changed no name in two cases.
@@ -20,11 +21,16 @@ def allowed(evidence: Evidence, found: Posterior) -> bool:
     """
     if sum(size**2 for size in found.sizes) > (evidence.thresholds.clear * found.together) ** 2:
         return False
-    return all(
-        evidence.given.candidates[m].has_sign_of(s)
-        for m, s in zip(found.members, found.strengths, strict=True)
-        if len(s) == 1 and evidence.given.candidates[m].name not in evidence.given.model.names
-    )
+    return all(has_its_sign(evidence, m, s) for m, s in zip(found.members, found.strengths, strict=True))
+
+
+def has_its_sign(evidence: Evidence, member: int, strengths: Array) -> bool:
+    """Whether the one strength of a candidate lies where physics allows; of what is in the model, its bounds saw to it.
+
+    Of several (k,) the linear estimates may lie beyond: a fit holds them within their bounds.
+    """
+    one = evidence.given.candidates[member]
+    return len(strengths) != 1 or one.name in evidence.given.model.names or one.has_sign_of(strengths)
 
 
 def additions(evidence: Evidence, members: Members, breadth: int = BREADTH, banned: Collection[str] = ()) -> list[int]:
@@ -35,7 +41,7 @@ def additions(evidence: Evidence, members: Members, breadth: int = BREADTH, bann
         one = evidence.given.candidates[k]
         if one.slot in taken or one.name in banned:
             continue
-        if one.name not in evidence.given.model.names and len(strengths) == 1 and not one.has_sign_of(strengths):
+        if not has_its_sign(evidence, k, strengths):
             continue
         if one.name not in best or score < best[one.name][0]:
             best[one.name] = (score, k)
