@@ -48,10 +48,11 @@ class Excitation:
     def hides(self, effect: Effect) -> bool:
         """Whether nothing shows an effect but how exactly its law is that of a corner, since it goes with the rate.
 
-        It does where only several rates or holds show it: at one rate without any hold it is another gain.
+        It does where only several rates or holds show it: at one rate without any hold, or none, it is another gain.
         """
         goes_with_the_rate = bool(effect.exposed_by) and effect.exposed_by <= {"rates", "holds"}
-        return goes_with_the_rate and len(self.rates_per_s) <= 1 and not self.is_held
+        sees_rates = len(self.rates_per_s) > 1 or (bool(self.rates_per_s) and self.is_held)
+        return goes_with_the_rate and not sees_rates
 
     def shows(self, effect: Effect) -> bool:
         """Whether this data holds any of what shows an effect.

@@ -92,15 +92,19 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
 
 
 def not_shown_of(name: Name, excitation: Excitation) -> str | None:
-    """What is said of a memory of which recordings of one load cycle hold nothing that shows it.
+    """What is said of an effect of which recordings of one load cycle, or of one rate, hold nothing that shows it.
 
-    A set that stays and an arm that relaxes slowly end such a cycle alike.
+    A set that stays and an arm that relaxes slowly end such a cycle alike; a gain that goes with the rate is another
+    gain at one rate.
     """
-    if excitation.shows(name.effect):
+    if excitation.hides(name.effect):
+        few = "recordings of one loading rate, without a hold, or of none that is seen,"
+    elif excitation.shows(name.effect):
         return None
+    else:
+        few = "recordings of one load cycle"
     ways = "; or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
-    said = _unnamed(name, "recordings of one load cycle cannot show it")
-    return f"{said}; it needs {ways or 'more load cycles'}"
+    return f"{_unnamed(name, f'{few} cannot show it')}; it needs {ways or 'more load cycles'}"
 
 
 def of_no_gas(name: Name, unit: Unit) -> str | None:

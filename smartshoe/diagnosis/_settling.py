@@ -35,7 +35,7 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
     path, best = [state.fit.model], state
     # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
-    while state.improved >= state.evidence.odds and (here := _names(state)) not in seen and len(path) <= ROUNDS:
+    while state.is_worth_a_fit and (here := _names(state)) not in seen and len(path) <= ROUNDS:
         seen.add(here)
         progress(f"fitting {listed(here[1]) or 'the baseline'}")
         likelihood = state.likelihood()
@@ -46,7 +46,7 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
         path.append(found.model)
         state = state_at(found, state.banned, given)
         best = state if _has_as_much_evidence(state, best) else best
-    if best is not state and state.improved >= state.evidence.odds:  # what was asked for about it has been tried
+    if best is not state and state.is_worth_a_fit:  # what was asked for about it has been tried
         state = replace(best, best=best.evidence.posterior(best.start))
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood()

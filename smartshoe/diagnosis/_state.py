@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis._likelihood import MOST_STEPS, Fit, Likelihood, fit
-from smartshoe.diagnosis._search import search, step
+from smartshoe.diagnosis._search import ROUNDING, search, step
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -43,6 +43,14 @@ class State:
     def improved(self) -> float:
         """By how much the best set has more evidence than that of the fit."""
         return self.evidence.posterior(self.start).score - self.best.score
+
+    @property
+    def is_worth_a_fit(self) -> bool:
+        """Whether the best set has more evidence than that of the fit by more than the odds against an effect.
+
+        By just these, but for rounding, it gains where an effect that does nothing goes, which asks for no other fit.
+        """
+        return self.improved > self.evidence.odds + ROUNDING
 
     @property
     def start(self) -> Members:

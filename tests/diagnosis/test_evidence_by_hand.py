@@ -322,6 +322,7 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
     assert state.start == ()
     assert state.improved == pytest.approx(state.evidence.posterior(()).score - state.best.score)
     assert state.improved > state.evidence.odds
+    assert state.is_worth_a_fit
     assert [one.name for one in state.chosen] == [state.given.candidates[m].name for m in state.best.members]
     large = max(state.best.sizes)
     for linear, bends in ((0.5 * large, True), (2.0 * large, False)):

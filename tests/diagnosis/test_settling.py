@@ -12,6 +12,7 @@ import pytest
 from told_evidence import STANDARD, ToldEvidence, candidate, told_fit, worth
 
 from smartshoe.diagnosis import _settling
+from smartshoe.diagnosis._state import State
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -33,6 +34,7 @@ class _State:
 
     thresholds = None
     banned = ()
+    is_worth_a_fit = State.is_worth_a_fit
 
     @property
     def given(self) -> _State:
@@ -106,7 +108,7 @@ def test_a_state_that_comes_back_ends_it(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (end.itself, fits) == (again.itself, 2)
 
 
-@pytest.mark.parametrize(("improved", "fits"), [(ODDS - 0.1, 0), (ODDS + 0.1, 1)])
+@pytest.mark.parametrize(("improved", "fits"), [(ODDS - 0.1, 0), (ODDS - 1e-9, 0), (ODDS + 1e-9, 0), (ODDS + 0.1, 1)])
 def test_nothing_is_fitted_for_less_than_the_odds_against_a_name(
     monkeypatch: pytest.MonkeyPatch, improved: float, fits: int
 ) -> None:
@@ -332,7 +334,7 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
     def state(name: str, improved: float) -> Any:
         return SimpleNamespace(
             name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
-            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), improved=improved,
+            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), is_worth_a_fit=improved > 10.0,
             evidence=SimpleNamespace(odds=10.0), thresholds=STANDARD, banned=("z",), likelihood=lambda: "likelihood",
         )  # fmt: skip
 

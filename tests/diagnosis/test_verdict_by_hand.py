@@ -175,6 +175,19 @@ def test_a_memory_of_which_single_load_cycles_show_nothing_is_said_with_what_wou
     assert not_shown_of(_named("permanent_set"), replace(once, is_cycled=True)) is None
 
 
+@pytest.mark.parametrize(
+    ("rates_per_s", "is_held", "is_shown"),
+    [((), False, False), ((), True, False), ((0.1,), False, False), ((0.1,), True, True), ((0.1, 0.5), False, True)],
+)
+def test_a_gain_that_goes_with_the_rate_is_not_named_where_no_two_rates_and_no_ramp_beside_a_hold_show_it(
+    rates_per_s: tuple[float, ...], is_held: bool, is_shown: bool
+) -> None:
+    data = Excitation(rates_per_s, (1.0,), frozenset(), STANDARD, is_held=is_held)
+    said = not_shown_of(_named("rate_gain"), data)
+    assert said is None if is_shown else "cannot show it, so that it is not named; it needs loads held" in str(said)
+    assert not_shown_of(_named("play_hysteresis"), data) is None  # a loop is seen at any one rate
+
+
 def _named(name: str) -> Any:
     return SimpleNamespace(effect=effect(name), member=SimpleNamespace(name=name))
 
