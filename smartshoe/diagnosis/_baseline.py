@@ -59,7 +59,9 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
         fast, slow = np.linalg.solve(part, gram[1:, 0])
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
         share = float(slow / fast) if fast != 0.0 else SHARE.upper
-        shares = (share,) if SHARE.lower <= share <= SHARE.upper else (SHARE.lower, SHARE.upper)
+        # A fit is within the bounds of both: beyond them it would begin at another solid than the one weighed here.
+        lowest, highest = max(SHARE.lower, RATE.lower / pole - 1.0), min(SHARE.upper, RATE.upper / pole - 1.0)
+        shares = (share,) if lowest <= share <= highest else (lowest, highest)
         for share in shares:
             shape = np.array([1.0, share]) / (1.0 + share)
             gain = float(shape @ gram[1:, 0] / (shape @ part @ shape))

@@ -22,6 +22,7 @@ from smartshoe.diagnosis._baseline import (
     is_turned_over,
     with_usual_arm,
 )
+from smartshoe.diagnosis._likelihood import within_bounds
 from smartshoe.diagnosis._prepared import prepared
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._sensitivity import (
@@ -47,8 +48,8 @@ def _slow_baseline(sessions: list[Any]) -> tuple[float, float, float]:
             rows.append(seen - past @ np.linalg.lstsq(past, seen, rcond=1e-10)[0])
         whole = np.concatenate(rows)
         fast, slow = np.linalg.lstsq(whole[:, 1:], whole[:, 0], rcond=None)[0]
-        within = -0.9 <= slow / fast <= 50.0
-        for share in (slow / fast,) if within else (-0.9, 50.0):
+        ends = max(-0.9, 0.01 / pole - 1.0), min(50.0, 50.0 / pole - 1.0)
+        for share in (slow / fast,) if ends[0] <= slow / fast <= ends[1] else ends:
             column = (whole[:, 1:2] + share * whole[:, 2:]) / (1.0 + share)
             (total,), square, *_ = np.linalg.lstsq(column, whole[:, 0], rcond=None)
             if total > 0.0:
@@ -78,6 +79,16 @@ def test_a_share_beyond_what_a_wall_can_have_is_held_at_its_bound(fast: float, s
     told = found.gain, found.relaxing_share, found.relaxation_rate_per_s
     assert SHARE.lower <= found.relaxing_share <= SHARE.upper
     assert told == pytest.approx(_slow_baseline(sessions), rel=1e-5)
+
+
+@pytest.mark.parametrize("lag_s", [0.5, 1.0, 2.0])
+def test_a_fit_begins_at_the_solid_that_was_weighed_also_where_the_reading_is_late(lag_s: float) -> None:
+    """A reading that is late asks for a share and a rate without end, of which a fit would cut the rate alone."""
+    sessions = sessions_under(MODEL)
+    for one in sessions:
+        one.reading = lagged(lagged(one.conditions.load, STEP_S, 0.5 * lag_s), STEP_S, 0.5 * lag_s)
+    found = baseline_of(sessions, SCALE)
+    assert within_bounds(found).theta == pytest.approx(found.theta, rel=1e-12)
 
 
 def test_a_unit_that_is_slower_than_its_load_is_not_turned_over() -> None:
