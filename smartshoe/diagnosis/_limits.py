@@ -125,6 +125,14 @@ def moved_of(name: Name) -> str:
     )
 
 
+def remembered_of(name: Name) -> str:
+    """What is said of a drift of the zero that may be what effects' arms still remember (`may_be_remembered`)."""
+    return (
+        "recordings begin loaded, and what the unit remembers of loads before them would read as"
+        f" {in_words(name.effect.name)} does, which is half sure at most (record a rest before the first load)"
+    )
+
+
 def few_cycles_of(name: Name, cycles: int) -> str:
     """What is said of an effect beside as many surer ones as there are load cycles to tell them by."""
     said = _unnamed(name, f"so few load cycles ({cycles}) show no more than as many causes")

@@ -61,7 +61,7 @@ def names_of(
     likely = [_with_untold(name, thresholds) for name in likely]
     is_bent = any(one.bends_too_little for one in members)
     likely = [
-        _doubted(name)
+        doubted(name)
         if is_unsteady
         or (is_clocked and name.effect.goes_with_the_clock)
         or (is_bent and not name.member.effect.is_memoryless)
@@ -84,11 +84,11 @@ def names_of(
         beside = [one for one in beside if confidence_of(one, thresholds) > 0.5 or one.member.size > departed]
         return tuple(one for one in likely if one in sure or one in beside)
     if larger := [one for one in possible if one.member.size > left]:
-        return tuple(_doubted(one) for one in larger)
+        return tuple(doubted(one) for one in larger)
     if alone is None:
         return ()
     by_itself = (one for one in possible if one.member.effect.kind == alone.kind)
-    return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
+    return tuple(doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
@@ -155,7 +155,8 @@ def _nearest_of_kind(block: Member) -> Effect:
     return min(alike or family, key=lambda e: margins.get(e.name, math.inf))
 
 
-def _doubted(name: Name) -> Name:
+def doubted(name: Name) -> Name:
+    """The name, half sure at most."""
     return replace(name, kind_probability=min(name.kind_probability, 0.5), is_sure=False)
 
 

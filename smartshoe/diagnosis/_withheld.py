@@ -19,9 +19,11 @@ from smartshoe.diagnosis._limits import (
     other_kind_of,
     parted_clocks,
     past_of,
+    remembered_of,
 )
-from smartshoe.diagnosis._naming import Name, names_of
+from smartshoe.diagnosis._naming import Name, doubted, names_of
 from smartshoe.diagnosis._prepared import Prepared
+from smartshoe.diagnosis._remembered import may_be_remembered
 from smartshoe.diagnosis._session import load_cycles
 from smartshoe.diagnosis._zero import Zero, creeping
 
@@ -51,6 +53,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
     thresholds = given.thresholds
     seen = _shown(found, given, left)
     seen = seen.without(lambda one: moved_of(one) if given.is_moved and one.effect.is_latency else None)
+    seen = _with_what_is_remembered(seen, found, given)
     rivals = seen.names
     seen = seen.without(lambda one: departure_of(one, rivals, thresholds))
     cycles = load_cycles(given.sessions, thresholds)
@@ -72,6 +75,14 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
     seen = seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
     of_tare = in_a_tare_of(kept, [one.effect for one in seen.names], given.scale, thresholds)
     return replace(seen, of_zeros=(*seen.of_zeros, *as_the_cell_shows_of(kept, given.scale), *of_tare))
+
+
+def _with_what_is_remembered(seen: Chosen, found: Inference, given: Prepared) -> Chosen:
+    """Half sure at most, and said to be, where an effect's arm may remember what a drift is told for."""
+    about = found.fit.model, given.sessions, given.thresholds
+    unsure = [one for one in seen.names if may_be_remembered(one, *about)]
+    names = tuple(doubted(one) if one in unsure else one for one in seen.names)
+    return replace(seen, names=names, limits=(*seen.limits, *(remembered_of(one) for one in unsure)))
 
 
 def _shown(found: Inference, given: Prepared, left: float) -> Chosen:

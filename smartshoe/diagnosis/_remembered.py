@@ -1,0 +1,63 @@
+"""Drifts of the zero that may be what a unit still remembers of loads before recordings that begin loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._held_out import residual_of
+from smartshoe.diagnosis._likelihood import rows_of
+from smartshoe.diagnosis._naming import Name
+from smartshoe.diagnosis._noise import FLOOR
+from smartshoe.diagnosis._sensitivity import nuisances
+from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects.effect import CoreEffect
+from smartshoe.models.elements import Arm
+from smartshoe.models.extended import ExtendedModel
+
+
+def may_be_remembered(drift: Name, model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> bool:
+    """Whether the arms of a model's effects, in any state as recordings begin, stand for a ``drift`` of the zero in it.
+
+    A model's arms begin as the first load would hold them; of a unit that begins loaded nothing tells for how long it
+    has been. Only the baseline's arm may begin in another state, for each model alike, so that what another arm
+    remembers has no place but a drift. It stands for one where it misses no more of it than laws depart by, all else
+    following.
+    """
+    if not (drift.effect.is_drift and drift.effect.is_seen_at_rest):
+        return False
+    bare = model.without(drift.member.name)
+    core = [part.effect.elements(part.values) for part in bare.parts if isinstance(part.effect, CoreEffect)]
+    arms = [one for elements in core for one in elements if isinstance(one, Arm)]
+    if not arms:
+        return False
+    fitted = fitted_of(sessions)
+    whole, without = (
+        sum(float(np.sum(residual_of(one, each)[one.fitted] ** 2)) for one in fitted)
+        for each in (model, drift.member.without.model)
+    )
+    gram = np.sum([_gram_beside(arms, one, bare, without) for one in fitted], axis=0)
+    beside = float(gram[0, 0] - gram[0, 1:] @ np.linalg.pinv(gram[1:, 1:], rcond=1e-10, hermitian=True) @ gram[1:, 0])
+    return beside - whole <= thresholds.departure**2 * (without - whole)
+
+
+def _gram_beside(arms: Sequence[Arm], session: Session, model: ExtendedModel, squares: float) -> Array:
+    """(1 + p, 1 + p) inner products of what ``model`` leaves and its slopes, beside the session's own and the arms.
+
+    These may begin, where the session begins loaded, in a state that is off by as much as its first load makes.
+    """
+    load, seen = abs(float(session.conditions.load[0])), session.fitted
+    time_s = session.conditions.time_s - session.conditions.time_s[0]
+    own = nuisances(session, model.pole_per_s, session.reading)
+    begins_loaded = load > session.unknown_past and not session.conditions.earlier.size
+    free = [(np.exp(-one.rate_per_s / (1.0 + one.share) * time_s), one.share) for one in arms if begins_loaded]
+    columns = np.column_stack([own, *(fading for fading, _ in free)])[seen]
+    sds = np.array([np.inf] * own.shape[1] + [max(abs(share * model.gain) * load, FLOOR) for _, share in free])
+    rows = rows_of(model, session)[seen]
+    variance = squares / max(int(seen.sum()), 1)
+    inner = columns.T @ columns + np.diag(variance / sds**2 + 1e-9)
+    cross = columns.T @ rows
+    return np.asarray(rows.T @ rows - cross.T @ np.linalg.solve(inner, cross))
