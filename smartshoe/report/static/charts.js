@@ -130,8 +130,14 @@
     } else {
       made.size = wide; made.space = 20;  // a low panel about zero needs a number beside it
     }
-    if (!made.values) made.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(chart.logX && isX ? 3 : 6)).replace("-", "−")));
+    if (!made.values) made.values = (u, splits) => splits.map((v) => (v === null ? "" : tick(v, chart.logX && isX ? 0 : splits[1] - splits[0])));
     return made;
+  }
+
+  // As many digits as part it from its neighbours, a step away; of a logarithmic axis three.
+  function tick(value, step) {
+    const told = step > 0 ? value.toFixed(Math.min(Math.max(1 - Math.floor(Math.log10(step)), 0), 20)) : value.toPrecision(3);
+    return String(+told).replace("-", "−");
   }
 
   // Round numbers on a logarithmic axis: as many as keep their labels apart, and two at least.
