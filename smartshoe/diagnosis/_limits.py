@@ -169,16 +169,21 @@ def end_of_range_of(model: ExtendedModel, sessions: Sequence[Session], threshold
     )
 
 
-def bent_to_the_end_of(model: ExtendedModel) -> str | None:
-    """What is said of a curve that would bend farther than its equation can."""
-    ended = [part.name for part in model.parts if part.bends_too_little]
-    if not ended:
-        return None
-    return (
-        f"{listed(ended, 'and')} has come to the end of its range: the unit bends farther"
-        " than that equation can, and what it misses may stand in the names of other effects, which are half sure at"
-        " most"
-    )
+def bent_to_the_end_of(model: ExtendedModel, names: Sequence[Name] = ()) -> str | None:
+    """What is said of a curve that would bend farther than its equation can, in a model or by which one is named."""
+    if ended := [part.name for part in model.parts if part.bends_too_little]:
+        return (
+            f"{listed(ended, 'and')} has come to the end of its range: the unit bends farther"
+            " than that equation can, and what it misses may stand in the names of other effects, which are half sure"
+            " at most"
+        )
+    by = [(one.effect.name, one.by.fit.model) for one in names if one.by is not None and one.by.fit is not None]
+    if followed := [name for name, fitted in by if fitted.part(name).bends_too_little]:
+        return (
+            f"{listed(followed, 'and')} has come to the end of its range: the unit bends farther than that equation"
+            " can, so that its parameters are bounds (the extended model keeps the free form)"
+        )
+    return None
 
 
 def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:

@@ -305,7 +305,7 @@ def _limits_of_the_names(found: Inference, given: Prepared, named: Chosen, exten
     """What limits the names: causes that are none, models at their ends, what was refused."""
     of_model = (
         end_of_range_of(extended, given.sessions, given.thresholds),
-        bent_to_the_end_of(extended),
+        bent_to_the_end_of(extended, named.names),
         wall_ratio_of(extended, given.sessions, given.thresholds),
     )
     near = nearest_of(found, given.thresholds)
