@@ -203,8 +203,8 @@ def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
             return []
         return [
-            f"the force of {name} is off by {worst_n:.2g} N (rms), that of what is held out by"
-            f" {held_n:.2g} N, which is no figure for such loads"
+            f"the force of {name} is off by {worst_n:.2g} N (rms): the {held_n:.2g} N of what is held out do not hold"
+            " for loads as it has"
         ]
     return [
         "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
