@@ -33,6 +33,7 @@ from smartshoe.diagnosis._members import Member, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
+from smartshoe.diagnosis._sensitivity import NO_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
 from smartshoe.diagnosis._settling import Progress, better_from, better_from_one, law_or_block, settled, simpler
 from smartshoe.diagnosis._state import State, evidence_about, fit_of, searched, state_at
@@ -67,6 +68,24 @@ class Inference:
     nearest: tuple[Effect, float, float] | None = None
     own_gains: tuple[OwnGain, ...] = ()
     zero_changes: tuple[ZeroChange, ...] = ()
+
+
+def inferred(
+    start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
+) -> Inference:
+    """`infer`; once more without what a gas remembers where that was found of a reading that is no gas's pressure.
+
+    There it is a free form of what gives way in holds, and no cause: what else leaves no more than a good unit's
+    imperfections do beside it is.
+    """
+    found = infer(start, sessions, thresholds, progress, is_unit)
+    units = {one.recording.sensor.unit.quantity for one in sessions}
+    if not (units <= NO_PRESSURES and any(is_remembered_by_gas(one.effect) for one in found.members)):
+        return found
+    progress("going through it again without what a gas remembers")
+    other = infer(start, [replace(one, is_no_gas=True) for one in sessions], thresholds, progress, is_unit)
+    missed = error_of(sessions, other.fit.model) ** 2 - error_of(sessions, found.fit.model) ** 2
+    return other if missed <= thresholds.tolerable**2 else found
 
 
 def infer(

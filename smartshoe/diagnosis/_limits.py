@@ -16,6 +16,7 @@ from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._sensitivity import NO_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import OwnZeros, Zero
@@ -28,7 +29,6 @@ from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import Unit
 
 ONE_CYCLE = "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
-NO_PRESSURES = frozenset({"force", "length", "resistance", "capacitance", "angle"})  # as a voltage or counts may be
 SAID = 4  # of many of a kind, as changes of a gain, that are told one by one
 
 
@@ -109,7 +109,7 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
 
 def of_no_gas(name: Name, unit: Unit) -> str | None:
     """What is said of what a gas remembers, where the reading is none of a gas's pressure."""
-    if unit.quantity not in NO_PRESSURES or name.effect.stage != "gas" or name.effect.is_memoryless:
+    if unit.quantity not in NO_PRESSURES or not is_remembered_by_gas(name.effect):
         return None
     return _unnamed(
         name,

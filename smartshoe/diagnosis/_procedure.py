@@ -21,7 +21,7 @@ from smartshoe.diagnosis._force import (
     not_undone_of,
 )
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
-from smartshoe.diagnosis._inference import Inference, infer
+from smartshoe.diagnosis._inference import Inference, inferred
 from smartshoe.diagnosis._lack_of_fit import repeating
 from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._limits import (
@@ -77,7 +77,7 @@ def diagnosed(
     """What ``recordings`` say of their simulation; the first ``count`` are fitted, the others judge."""
     given = prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
-    found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
+    found = inferred(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     left = _left_by(found, given, integrity.faults)
     named = _named(found, given, left)

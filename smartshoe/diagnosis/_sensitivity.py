@@ -27,6 +27,8 @@ from smartshoe.models.effects.exposure import CHANNELS
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.lags import lagged
 
+NO_PRESSURES = frozenset({"force", "length", "resistance", "capacitance", "angle"})  # as a voltage or counts may be
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -75,6 +77,11 @@ class Candidate:
         )
 
 
+def is_remembered_by_gas(effect: Effect) -> bool:
+    """Whether it is what a gas remembers, which shows in its pressure alone."""
+    return effect.stage == "gas" and not effect.is_memoryless
+
+
 def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
     """Physical effects and flexible blocks whose channels were logged throughout.
 
@@ -86,6 +93,8 @@ def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effec
     has_cycles = have_later_cycles(sessions, thresholds)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
+    if any(one.is_no_gas for one in sessions):
+        found = [e for e in found if not is_remembered_by_gas(e)]
     if not any(one.recording.sensor.unit.quantity == "pressure" for one in sessions):
         found = [e.of_any_sensor() for e in found]
     return [e for e in found if e.needs <= has and not e.is_refinement and (has_cycles or not e.needs_cycles)]

@@ -55,6 +55,7 @@ class Session:
     ``gap_ends``: the first samples after gaps in which the load is not known for so long that the wall may have crept.
     ``unknown_past``: the load, as a share, that a unit may remember from before it where it begins at rest.
     ``white_sd``: standard deviation of the reading's white noise at the full rate, as ``quiet.raw`` is of the load's.
+    ``is_no_gas``: what a gas remembers is not looked for in it.
     """
 
     recording: Recording
@@ -74,6 +75,7 @@ class Session:
     gap_ends: tuple[int, ...] = ()
     unknown_past: float = 1.0
     white_sd: float = 0.0
+    is_no_gas: bool = False
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:

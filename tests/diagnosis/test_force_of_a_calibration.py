@@ -199,9 +199,7 @@ def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Sessi
     (said,) = as_calibrated(found, STANDARD)
     off_n = force_error([quick], late).fitted_n
     assert off_n > STANDARD.clear * STANDARD.tolerable * late.full_scale_load_n
-    assert said.startswith(
-        f"the force of {one.recording.name} is off by {off_n:.2g} N (rms): the 0.1"
-    )
+    assert said.startswith(f"the force of {one.recording.name} is off by {off_n:.2g} N (rms): the 0.1")
     for held_n in (off_n / STANDARD.clear * 1.01, np.nan):  # nearly as far off as what is held out, or none is
         assert as_calibrated(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
 

@@ -94,7 +94,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         return SimpleNamespace(name=name.name, size=made.sizes[name.name], rivals=(f"rival of {name.name}",))
 
     answer("prepared", given)
-    answer("infer", found)
+    answer("inferred", found)
     answer("residual_of", lambda session, model: f"{getattr(session, 'name', session)} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
     answer("repeating", lambda fine, left, thresholds: (fine, left))
@@ -139,5 +139,5 @@ def run_diagnosis(parts: Any, thresholds: Thresholds = STANDARD) -> Any:
 def name_of(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, kind: float = 0.9) -> Any:
     known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
     return SimpleNamespace(
-        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind_probability=kind
+        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind_probability=kind, by=None
     )
