@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._scales import local_scale, own_corner
 from smartshoe.integrity._view import Signal, View
@@ -147,7 +148,7 @@ def _stands_alone(signal: Signal, found: Mask) -> Mask:
 
 def _finding(view: View, at: Mask, signal: Signal, span: float, what: str) -> Finding:
     size = np.abs(signal.outlying[at])
-    largest = f"{100.0 * float(size.max()) / span:.0f} % of its span"
+    largest = f"{percent(float(size.max()) / span)} of its span"
     said = f"an isolated spike of {largest}: it is left out"
     if size.size > 1:
         said = f"{size.size} isolated spikes, the largest of {largest}: they are left out"

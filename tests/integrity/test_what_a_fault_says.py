@@ -52,6 +52,12 @@ def test_a_spike_alone_is_said_with_its_size_and_several_with_the_largest() -> N
         assert _said(_pressed(READING, load)) == ("spikes", f"the reference load {said}")
 
 
+def test_a_small_spike_has_a_size_too() -> None:
+    held = np.clip(1.5 * TRIANGLE, 0.0, 1.0)
+    spiked = _changed(held + 1e-5 * NOISE[0], (1222, 3.2e-3))
+    assert "an isolated spike of 0.32 % of its span" in _said(_pressed(spiked, held))[1]
+
+
 @pytest.mark.parametrize(
     ("missing", "said"),
     [
