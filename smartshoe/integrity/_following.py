@@ -128,7 +128,7 @@ def _goes_on(view: View) -> float:
 def _followed_share(view: View) -> tuple[float, float]:
     """Share of the reading's variance about a straight line in time that load explains; correlation of increments.
 
-    About its mean where the load is itself such a line.
+    About its mean where each load comes but once: time is then the load's, and no drift is told from what follows it.
     """
     n = view.reading.values.size
     width = max(1, n // view.thresholds.bins)
@@ -138,7 +138,7 @@ def _followed_share(view: View) -> tuple[float, float]:
     curve = np.interp(load, view.curve[0], view.curve[1])
     columns = np.concatenate([of_load(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1)
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
-    if float(np.std(_beyond(load, base))) < view.thresholds.standing * float(np.ptp(load)):
+    if _comes_once(load, view.thresholds):
         base = base[:, :1]
     left_base, left = _beyond(reading, base), _beyond(reading, np.concatenate([base, columns], axis=1))
     total = float(np.dot(left_base, left_base))
@@ -149,6 +149,15 @@ def _followed_share(view: View) -> tuple[float, float]:
         for stride_s in view.thresholds.memory_s
     )
     return 1.0 - float(np.dot(left, left)) / total, together
+
+
+def _comes_once(load: Array, thresholds: Thresholds) -> bool:
+    """Whether a load (n,) goes one way, straight or not, and stands nowhere: its ranks are those of its moments."""
+    from scipy.stats import rankdata
+
+    moment, place = np.arange(1.0, load.size + 1.0), rankdata(load)
+    off = min(float(np.std(place - moment)), float(np.std(place + moment)))
+    return off < thresholds.standing * load.size
 
 
 def _beyond(signal: Array, columns: Array) -> Array:

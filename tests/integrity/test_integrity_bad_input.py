@@ -143,6 +143,34 @@ def test_a_single_ramp_is_followed(rest_s: float, noise: float) -> None:
     assert examine([_recording(force_n=load_n, pressure_mbar=reading)]).refusals == ()
 
 
+@pytest.mark.parametrize("power", [0.4, 1.0, 2.5])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_ramp_whose_reading_is_a_line_in_time_is_followed(power: float, way: float) -> None:
+    """As at a constant speed: the load is bent, and the reading all that a drift would be."""
+    share = TIME_S / TIME_S[-1] if way > 0.0 else 1.0 - TIME_S / TIME_S[-1]
+    noise = np.random.default_rng(3).standard_normal((2, share.size))
+    bent = _recording(force_n=85.0 * share**power + 0.2 * noise[0], pressure_mbar=80.0 * share + 5e-3 * noise[1])
+    assert examine([bent]).refusals == ()
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        TRIANGLE,
+        np.minimum(TIME_S, 9.0 * (60.0 - TIME_S)) / 54.0,
+        np.minimum(TIME_S / 30.0, 1.0),
+        np.floor(TIME_S / 6.0),
+        1.0 * (TIME_S > 30.0),
+    ],
+    ids=["triangles", "and back a little", "held after", "staircase", "step"],
+)
+@pytest.mark.parametrize("noise", [0.0, 3e-3])
+def test_what_merely_drifts_does_not_follow_a_load_that_stands_or_comes_back(load: Array, noise: float) -> None:
+    of_load, of_reading = np.random.default_rng(3).standard_normal((2, TIME_S.size))
+    drifting = _recording(force_n=800.0 * (load + noise * of_load), pressure_mbar=TIME_S + 5e-3 * of_reading)
+    assert "the reading does not follow the load" in examine([drifting]).refusals[0]
+
+
 def test_noise_does_not_follow_a_single_ramp() -> None:
     found = examine([_recording(force_n=TIME_S, pressure_mbar=np.random.default_rng(3).standard_normal(TIME_S.size))])
     assert "the reading does not follow the load" in found.refusals[0]
