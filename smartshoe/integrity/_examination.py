@@ -10,6 +10,7 @@ import numpy as np
 from smartshoe.arrays import Mask
 from smartshoe.display import first_names
 from smartshoe.errors import InputError
+from smartshoe.integrity._blanks import without_blanks
 from smartshoe.integrity._clocks import align, from_two_clocks, one_clock, two_clocks
 from smartshoe.integrity._dropouts import dropouts, load_dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity, OneClock
@@ -154,11 +155,13 @@ def _ends_told_by(findings: Sequence[Finding]) -> Ends:
 
 def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
     made = []
-    for read, held in without_held(recordings, thresholds):
+    filled = [without_blanks(one, thresholds) for one in recordings]
+    for (_, blank), (read, held) in zip(filled, without_held([one for one, _ in filled], thresholds), strict=True):
         measured, between = without_interpolated(read, thresholds)
         logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
-        made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild), bool(held or between)))
+        own = (*blank, *held, *between)  # samples that are no measurements of their own
+        made.append(_Tamed(logged, recording, (*own, *wrapped, *wild), bool(own)))
     return made
 
 
