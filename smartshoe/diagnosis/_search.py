@@ -12,7 +12,7 @@ MOST_MEMBERS = 7
 BREADTH = 5  # of the likeliest, that are weighed beside a set
 SWAPS = 3  # that are weighed in the place of each member; and fits of whole models that are gone on with
 RIVALS = 2  # that are fitted as whole models beside the best, or shapes from which one is
-ROUNDING = 1e-6  # of -2 log evidence: what differs by less is a dead heat
+DEAD_HEAT = 1e-6  # of -2 log evidence: what differs by less is a dead heat
 
 
 def allowed(evidence: Evidence, found: Posterior) -> bool:
@@ -68,7 +68,7 @@ def search(evidence: Evidence, start: Members = (), banned: Collection[str] = ()
     best = evidence.posterior(start)
     while True:
         found = step(evidence, best.members, banned)
-        if found.score >= best.score - ROUNDING:
+        if found.score >= best.score - DEAD_HEAT:
             return best
         best = found
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis._likelihood import MOST_STEPS, Fit, Likelihood, fit
-from smartshoe.diagnosis._search import ROUNDING, search, step
+from smartshoe.diagnosis._search import DEAD_HEAT, search, step
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -50,7 +50,7 @@ class State:
 
         By just these, but for rounding, it gains where an effect that does nothing goes, which asks for no other fit.
         """
-        return self.improved > self.evidence.odds + ROUNDING
+        return self.improved > self.evidence.odds + DEAD_HEAT
 
     @property
     def start(self) -> Members:

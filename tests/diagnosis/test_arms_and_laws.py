@@ -199,8 +199,8 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
     def state(name: str) -> Any:
         model = SimpleNamespace(names=(), parts=(), without=lambda other: f"without {other}")
         return SimpleNamespace(
-            name=name, fit=SimpleNamespace(model=model), chosen=(), is_worth_a_fit=False, thresholds=None, banned=("z",),
-            evidence=SimpleNamespace(odds=10.0), likelihood=lambda: None,
+            name=name, fit=SimpleNamespace(model=model), chosen=(), is_worth_a_fit=False, thresholds=None,
+            banned=("z",), evidence=SimpleNamespace(odds=10.0), likelihood=lambda: None,
         )  # fmt: skip
 
     banned: list[Any] = []
