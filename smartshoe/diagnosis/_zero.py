@@ -8,7 +8,7 @@ never unloaded, or may be loaded where the log says nothing, either may make the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +74,7 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
     """
     if is_stretched(model):
         return None
-    there = all_fitted(one for one in sessions if one.usable.any() and "continues" not in one.recording.metadata)
+    there = all_fitted(one for one in _begun(sessions) if one.usable.any())
     if not there:
         return None
     each = offsets(there, model)
@@ -84,6 +84,11 @@ def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
     return OwnZeros(tuple(one.recording.name for one in there), each)
 
 
+def _begun(sessions: Iterable[Session]) -> Iterator[Session]:
+    """Those that do not continue another."""
+    return (one for one in sessions if "continues" not in one.recording.metadata)
+
+
 def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:
     """(m, 6) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
@@ -91,10 +96,11 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
     by then, and what the unit is seen to remember from before the recording, as where a walk was cut: these are taken
     out. The third column is how much they are, the fourth how much with what is remembered as it was at first. The last
     two are the standard deviations that white noise leaves to the means of load and reading. A load that begins to rise
-    at once is no rest, nor is one whose reading, on a clock that is early, has begun to rise before it.
+    at once is no rest, nor is one whose reading, on a clock that is early, has begun to rise before it; nor is any of
+    a recording that continues another, in which something has happened.
     """
     found = []
-    for session in sessions:
+    for session in _begun(sessions):
         load = session.conditions.load
         borne = _without_what_rests_show(model).simulate(session.conditions)
         resting = session.resting.copy()

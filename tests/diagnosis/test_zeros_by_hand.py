@@ -137,7 +137,7 @@ def _session(load: Array, fitted: Any = None) -> Any:
     kept = np.ones(load.size, dtype=bool) if fitted is None else fitted
     return SimpleNamespace(
         conditions=Conditions(0.1 * np.arange(load.size), load, 0.1), fitted=kept, reading=0.0 * load,
-        resting=np.abs(load) < 0.02, recording=SimpleNamespace(command_n=None), thinned=1,
+        resting=np.abs(load) < 0.02, recording=SimpleNamespace(command_n=None, metadata={}), thinned=1,
         own_gain_sd=0.0, gain_parts=(), zero_changes=(), gap_ends=(),
         quiet=SimpleNamespace(raw=0.0), white_sd=0.0,
     )  # fmt: skip
@@ -333,13 +333,13 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     assert first_rests([one], MODEL, STANDARD).size == 0
     for asked, is_told in ((0.99, True), (1.01, False), (-0.99, True), (-1.01, False)):
         command = np.concatenate([np.full(10, asked), np.linspace(1.0, -1000.0, 80)])
-        one.recording = SimpleNamespace(command_n=command)
+        one.recording = SimpleNamespace(command_n=command, metadata={})
         found = first_rests([one], MODEL, STANDARD)
         assert found.shape == ((1, 6) if is_told else (0, 6))
         if is_told:
             assert found[0, :2] == pytest.approx([0.3, 0.2 / 0.8])
     moved = _rested(30, level=0.3, reading=0.2)
-    moved.recording = SimpleNamespace(command_n=np.zeros(90))
+    moved.recording = SimpleNamespace(command_n=np.zeros(90), metadata={})
     moved.conditions.load[3:] = 0.3 + 0.02
     assert first_rests([moved], MODEL, STANDARD).size == 0
     # A command at the full rate is taken at the thinned samples; one that ends earlier has no rest beyond.
@@ -347,7 +347,7 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     thin.thinned, thin.resting[:] = 3, False
     command = np.full(90, 500.0)
     command[0:12:3] = 0.0
-    thin.recording = SimpleNamespace(command_n=command)
+    thin.recording = SimpleNamespace(command_n=command, metadata={})
     assert first_rests([thin], MODEL, STANDARD).shape == (1, 6)
     command[0] = 500.0
     assert first_rests([thin], MODEL, STANDARD).size == 0
@@ -562,3 +562,11 @@ def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> 
     limits = effect("dead_band").parameters[0]
     wide = parameters_of(fit, "dead_band", SCALE)["lost_load"]
     assert wide.ci95 == pytest.approx((800.0 * limits.lower, 800.0 * limits.upper))
+
+
+def test_a_rest_of_what_continues_a_recording_is_no_first_one() -> None:
+    """The unit still remembers what that held."""
+    first, later = _rested(25), _rested(25, reading=0.03)
+    later.recording = SimpleNamespace(**{**vars(first.recording), "metadata": {"continues": "first"}})
+    assert first_rests([first, later], MODEL, STANDARD) == pytest.approx(first_rests([first], MODEL, STANDARD))
+    assert not first_rests([later], MODEL, STANDARD).size
