@@ -73,14 +73,15 @@ class Inference:
 def inferred(
     start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
 ) -> Inference:
-    """`infer`; once more without what a gas remembers where that was found of a reading that is no gas's pressure.
+    """`infer`; once more without what a gas remembers where that is most of what relaxes in no gas's pressure.
 
     There it is a free form of what gives way in holds, and no cause: what else leaves no more than a good unit's
     imperfections do beside it is.
     """
     found = infer(start, sessions, thresholds, progress, is_unit)
     units = {one.recording.sensor.unit.quantity for one in sessions}
-    if not (units <= NO_PRESSURES and any(is_remembered_by_gas(one.effect) for one in found.members)):
+    relaxing = [one for one in found.members if isinstance(one.effect, CoreEffect) or is_remembered_by_gas(one.effect)]
+    if not (units <= NO_PRESSURES and any(is_remembered_by_gas(one.effect) for one in relaxing[:1])):
         return found
     progress("going through it again without what a gas remembers")
     other = infer(start, [replace(one, is_no_gas=True) for one in sessions], thresholds, progress, is_unit)
