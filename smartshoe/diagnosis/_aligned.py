@@ -37,7 +37,7 @@ class Aligned:
 def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
     """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own.
 
-    One that only judges, and goes by another clock than the model bears, is moved to that one.
+    One that only judges, and goes by another clock than the fitted ones share, is moved to that one.
     """
     places = [k for k, mask in enumerate(integrity.usable) if mask.any()]
     lags, rates = integrity.clock_offset_s, integrity.clock_rate
@@ -45,20 +45,21 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
     shared = integrity.one_clock
     is_told = any(lags[k] or rates[k] for k in places if k not in integrity.others)
     borne = shared if is_told and shared is not None and abs(shared.before_s) < delay.parameters[0].upper else None
+    theirs = borne if is_told else shared
     made, usable, says, moved = [], [], [], []
     for place in places:
         recording, mask, offset_s, rate = recordings[place], integrity.usable[place], lags[place], rates[place]
-        if borne is not None:
-            offset_s, rate = (
-                (offset_s - borne.before_s - 0.5 * borne.rate * recording.duration_s, rate - borne.rate)
-                if place in integrity.others
-                else (0.0, 0.0)
-            )
+        if place in integrity.others and theirs is not None:
+            middle_s = np.array(0.5 * recording.duration_s)
+            offset_s, rate = offset_s - float(theirs.lag_s(middle_s)), rate - theirs.rate
+        elif borne is not None:
+            offset_s = rate = 0.0
         if offset_s or rate:
             moved.append(place)
             recording, mask = _on_one_clock(recording, mask, float(offset_s), float(rate))
             way = "earlier" if offset_s > 0 else "later"
-            by = f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}"
+            more = f" in the middle, by {abs(rate):.2g} s {'more' if rate * offset_s >= 0 else 'less'} each second,"
+            by = f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}{more if rate else ''}"
             says.append(
                 f"{by} to the clock of the recordings that are fitted, before it judges"
                 if place in integrity.others

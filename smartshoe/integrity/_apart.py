@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._answers import binned
-from smartshoe.integrity._clocks import Lags, made_of
+from smartshoe.integrity._clocks import Lags, clock_through, made_of
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity.thresholds import Thresholds
@@ -24,38 +24,14 @@ from smartshoe.recording import Recording
 STEPS = 4  # of Gauss and Newton: a lag within what the smoothing spans is found in two
 
 
-@dataclass(frozen=True, eq=False)
-class Told:
-    """What is known of the clocks before recordings are compared: ``own_s``, lags that are told, by place.
-
-    ``shared``: the clock that all that are fitted go by, or None; lags are beside it. ``fitted``: how many, from the
-    first, foretell; all others are foretold only. ``perhaps``: one that all may go by, if it tells as much as lags of
-    their own.
-    """
-
-    own_s: Mapping[int, float]
-    shared: OneClock | None
-    fitted: int
-    perhaps: OneClock | None = None
-
-
 @on_one_thread
-def apart_s(
-    recordings: Sequence[Recording],
-    usable: Sequence[Mask],
-    lags: Sequence[Lags],
-    thresholds: Thresholds,
-    told: Told,
-) -> dict[int, float]:
-    """By place, how much later the reading of a recording follows than those of the others that are fitted.
-
-    First of those of which no lag is told. The longest lag of its own comes first, since of two recordings either may
-    be the late one: each is foretold by all others, on the clocks that are found by then. Then those of which one is
-    told, and those that are not fitted, each by all before it that are fitted: its own lag is where to look from.
-    """
+def runs_of(
+    recordings: Sequence[Recording], usable: Sequence[Mask], count: int, thresholds: Thresholds
+) -> dict[int, Run]:
+    """By place, what is compared of recordings, of which the first ``count`` foretell; none where nothing can tell."""
     of_use = [place for place, mask in enumerate(usable) if mask.sum() >= thresholds.least_samples]
-    fitted = [place for place in of_use if place < told.fitted]
-    if len(of_use) < 2 or not fitted:
+    fitted = [place for place in of_use if place < count]
+    if not fitted:
         return {}
     longest_s = max(recordings[k].duration_s for k in fitted)
     step_s = max(thresholds.echo_s / thresholds.clear, longest_s / thresholds.bins)
@@ -63,32 +39,94 @@ def apart_s(
     ends_n = min(float(one.min()) for one in loads), max(float(one.max()) for one in loads)
     if ends_n[0] == ends_n[1]:
         return {}
-    runs = {}
-    for place in of_use:
-        run = _run(recordings[place], usable[place], step_s, ends_n, thresholds)
-        if run is not None:
-            runs[place] = run.on(told.shared)
-    told_last = sorted((k for k in runs if k in told.own_s), key=lambda k: abs(told.own_s[k]))
-    first = [k for k in runs if k < told.fitted and k not in told.own_s]
-    found = {} if told.shared else _of_first({place: runs[place] for place in first}, lags, thresholds)
-    if found:  # foretold at other loads than the others had: one unit must follow all of them better by these lags
-        moved = [runs[place].earlier(found.get(place, 0.0)) for place in first]
-        by_one_clock = ([runs[place].on(clock) for place in first] for clock in (None, told.perhaps))
-        if min(_left(one) for one in by_one_clock) <= _left(moved):
-            found = {}
-    known = [runs[place].earlier(found.get(place, 0.0)).products for place in first]
-    later = [*(k for k in told_last if k < told.fitted), *(k for k in runs if k >= told.fitted)]
-    for place in later:
-        own_s = told.own_s.get(place, 0.0)
-        lag_s = _later_s(runs[place], np.sum(known, axis=0), thresholds, own_s) if known else 0.0
-        if lag_s:
-            found[place] = lag_s
-        if place < told.fitted:
-            known.append(runs[place].earlier(lag_s or own_s).products)
+    runs = {place: _run(recordings[place], usable[place], step_s, ends_n, thresholds) for place in of_use}
+    return {place: run for place, run in runs.items() if run is not None}
+
+
+@on_one_thread
+def refined(clock: OneClock, seen: Sequence[Lags], runs: Sequence[Run], thresholds: Thresholds) -> OneClock:
+    """The ``clock`` that recordings share, or the line through lags that are ``seen`` by which one unit follows best.
+
+    Its rate is what one unit tells, and its lags are those that are seen: what is late by a little a unit may make
+    itself. In the place of a delay it must leave far fewer squares that one unit does not foretell than any delay.
+    """
+    through = clock_through(seen)
+    if through is None or not runs:
+        return clock
+    line = clock_through(seen, _refined(through, 2, runs, thresholds).rate)
+    least, plain = (1.0, clock) if clock.rate else (thresholds.clear, _refined(clock, 1, runs, thresholds))
+    return line if line is not None and least * unforetold(runs, line) < unforetold(runs, plain) else clock
+
+
+def _refined(about: OneClock, parts: int, runs: Sequence[Run], thresholds: Thresholds) -> OneClock:
+    """A clock of so many ``parts``, as in `_later`, by which one unit follows best; ``about`` itself if it is far."""
+    found = about
+    for _ in range(STEPS):
+        moved = [run.on(found) for run in runs]
+        weights = _weights(_products(moved))
+        joint = [np.column_stack([run.made, run.late_by(run.made @ weights)[:, :parts]]) for run in moved]
+        normal = sum(one.T @ np.column_stack([one, run.read]) for one, run in zip(joint, moved, strict=True))
+        found = _moved_by(found, _weights(np.asarray(normal))[-parts:])
+        if any(_farthest_s(run, found, about) > thresholds.settled_s for run in runs):
+            return about
     return found
 
 
-def _of_first(runs: Mapping[int, _Run], lags: Sequence[Lags], thresholds: Thresholds) -> dict[int, float]:
+def unforetold(runs: Sequence[Run], clock: OneClock | None = None) -> float:
+    """Squares of what is read that one unit does not foretell, by a clock that all go by."""
+    return _left([run.on(clock) for run in runs])
+
+
+@on_one_thread
+def apart_s(
+    runs: Mapping[int, Run],
+    lags: Sequence[Lags],
+    thresholds: Thresholds,
+    own_s: Mapping[int, float],
+    perhaps: OneClock | None = None,
+) -> dict[int, float]:
+    """By place, how much later the reading of a recording follows than those of the others.
+
+    First of those of which no lag is told. The longest lag of its own comes first, since of two recordings either may
+    be the late one: each is foretold by all others, on the clocks that are found by then. Then those of which one is
+    told, ``own_s``, each by all before it: its own lag is where to look from. ``perhaps``: a clock that all may go by,
+    if it tells as much as lags of their own.
+    """
+    first = [place for place in runs if place not in own_s]
+    found = _of_first({place: runs[place] for place in first}, lags, thresholds)
+    if found:  # foretold at other loads than the others had: one unit must follow all of them better by these lags
+        alike = [runs[place] for place in first]
+        moved = [runs[place].earlier(found.get(place, 0.0)) for place in first]
+        if min(unforetold(alike), unforetold(alike, perhaps)) <= _left(moved):
+            found = {}
+    known = [runs[place].earlier(found.get(place, 0.0)) for place in first]
+    for place in sorted((k for k in runs if k in own_s), key=lambda k: abs(own_s[k])):
+        lag_s = _later_s(runs[place], _products(known), thresholds, own_s[place]) if known else 0.0
+        if lag_s:
+            found[place] = lag_s
+        known.append(runs[place].earlier(lag_s or own_s[place]))
+    return found
+
+
+@on_one_thread
+def beside(run: Run, others: Sequence[Run], thresholds: Thresholds, own_s: float, own: OneClock) -> OneClock | None:
+    """The clock by which a recording follows beside the ``others`` that foretell it, or None where it goes by theirs.
+
+    A lag about ``own_s``; a line about ``own`` where it is foretold far better still by that.
+    """
+    foretold = run.made @ _weights(_products(others))
+    found = None
+    for about, parts in ((OneClock(own_s, 0.0), 1), (own, 2)):
+        found = _later(run, foretold, thresholds, about, parts, found) or found
+    return found if found is not None and is_better(found, run, others) else None
+
+
+def is_better(clock: OneClock, run: Run, others: Sequence[Run]) -> bool:
+    """Whether one unit follows a recording and the ``others`` better if it goes by a clock of its own."""
+    return _left([*others, run.on(clock)]) < _left([*others, run])
+
+
+def _of_first(runs: Mapping[int, Run], lags: Sequence[Lags], thresholds: Thresholds) -> dict[int, float]:
     """The same of recordings of which no lag is told."""
     if len(runs) < 2:
         return {}
@@ -107,11 +145,11 @@ def _of_first(runs: Mapping[int, _Run], lags: Sequence[Lags], thresholds: Thresh
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
-    """A recording over even bins at ``grid`` (b,): increments of what a unit may make of its load, ``made`` (b, k).
+class Run:
+    """What is compared of a recording, over even bins at ``grid`` (b,).
 
-    And of its reading, ``read`` (b,). ``began_s``: when it began. ``least_s``: a shorter lag may be the delay of a
-    logger.
+    ``made`` (b, k): increments of what a unit may make of its load; ``read`` (b,): those of its reading. ``began_s``:
+    when it began. ``least_s``: a shorter lag may be the delay of a logger.
     """
 
     grid: Array
@@ -125,20 +163,35 @@ class _Run:
         """(k, k + 1) inner products of what is made of the load, with itself and with the reading."""
         return np.asarray(self.made.T @ np.column_stack([self.made, self.read]))
 
-    def earlier(self, by_s: float) -> _Run:
+    def earlier(self, by_s: float) -> Run:
         """The same with its reading earlier."""
         return self.on(OneClock(by_s, 0.0)) if by_s else self
 
-    def on(self, clock: OneClock | None) -> _Run:
+    def on(self, clock: OneClock | None) -> Run:
         """The same with its reading earlier by the lag of a clock."""
-        if clock is None:
-            return self
-        return replace(self, read=np.interp(self.grid + clock.lag_s(self.grid - self.began_s), self.grid, self.read))
+        return (
+            self
+            if clock is None
+            else replace(self, read=np.interp(self.grid + self.lag_s(clock), self.grid, self.read))
+        )
+
+    def lag_s(self, clock: OneClock) -> Array:
+        """(b,) lags of a clock."""
+        return clock.lag_s(self.grid - self.began_s)
+
+    def late(self, values: Array, clock: OneClock) -> Array:
+        """``values`` (b,) later by the lag of a clock."""
+        return np.asarray(np.interp(self.grid - self.lag_s(clock), self.grid, values))
+
+    def late_by(self, foretold: Array) -> Array:
+        """(b, 2) what a second of lag, and what one more in each second, adds to what is ``foretold`` (b,)."""
+        slope = -np.gradient(foretold, float(self.grid[1] - self.grid[0]))
+        return np.column_stack([slope, slope * (self.grid - self.began_s)])
 
 
 def _run(
     recording: Recording, usable: Mask, step_s: float, ends_n: tuple[float, float], thresholds: Thresholds
-) -> _Run | None:
+) -> Run | None:
     """None of a recording that lasts for a few bins: beside one of a day a minute tells nothing of moments."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -155,10 +208,10 @@ def _run(
     smooth = max(thresholds.echo_s / step_s, 1.0)
     made = made_of((load - ends_n[0]) / (ends_n[1] - ends_n[0]), step_s, smooth, thresholds)
     read, least_s = gaussian_filter1d(reading, smooth, order=1), thresholds.few * recording.sample_time_s
-    return _Run(grid, made, read, float(recording.time_s[0]), least_s)
+    return Run(grid, made, read, float(recording.time_s[0]), least_s)
 
 
-def _of_others(runs: Sequence[_Run]) -> list[Array]:
+def _of_others(runs: Sequence[Run]) -> list[Array]:
     """For each of them the sum of all others' products: of those before it and of those after it."""
     products = np.array([one.products for one in runs])
     nothing = np.zeros_like(products[:1])
@@ -167,34 +220,57 @@ def _of_others(runs: Sequence[_Run]) -> list[Array]:
     return [*(before + after)]
 
 
-def _later_s(run: _Run, others: Array, thresholds: Thresholds, own_s: float = 0.0) -> float:
-    """How much later one reading follows than the ``others``, by their products, foretell; about ``own_s``.
+def _later_s(run: Run, others: Array, thresholds: Thresholds, own_s: float = 0.0) -> float:
+    """How much later one reading follows than the ``others``, by their products, foretell; about ``own_s``, or 0."""
+    found = _later(run, run.made @ _weights(others), thresholds, OneClock(own_s, 0.0), 1)
+    return 0.0 if found is None else found.before_s
 
-    0 where it is not foretold far better so, at rising and at falling edges alike: load that the unit remembers has a
-    lag for each direction.
+
+def _later(
+    run: Run, foretold: Array, thresholds: Thresholds, about: OneClock, parts: int, known: OneClock | None = None
+) -> OneClock | None:
+    """The clock by which a reading follows what is ``foretold`` (b,), about another: a lag, or a line of two ``parts``.
+
+    None where it is not foretold far better so than by the one that is ``known``, at rising and at falling edges alike:
+    load that the unit remembers has a lag for each direction.
     """
-    foretold = run.made @ _weights(others)
     rises = (run.made[:, 0] > 0.0).astype(float)
-    lag_s, step_s = own_s, float(run.grid[1] - run.grid[0])
+    found = about
     for _ in range(STEPS):
-        shifted = np.interp(run.grid - lag_s, run.grid, foretold)
-        slope = -np.gradient(shifted, step_s)
-        lag_s += float(slope @ (run.read - shifted)) / max(float(slope @ slope), 1e-300)
-        if abs(lag_s - own_s) > thresholds.settled_s:
-            return 0.0
+        shifted = run.late(foretold, found)
+        columns = run.late_by(shifted)[:, :parts]
+        size = np.linalg.norm(columns, axis=0) + 1e-150
+        by = np.linalg.lstsq(columns / size, run.read - shifted)[0] / size
+        found = _moved_by(found, by)
+        if _farthest_s(run, found, about) > thresholds.settled_s:
+            return None
 
-    def left(late_s: float) -> Array:
-        off = run.read - np.interp(run.grid - late_s, run.grid, foretold)
-        up = np.interp(run.grid - late_s, run.grid, rises)
+    def left(clock: OneClock) -> Array:
+        off, up = run.read - run.late(foretold, clock), run.late(rises, clock)
         return np.array([np.sum(up * off**2), np.sum((1.0 - up) * off**2)])
 
-    is_foretold = np.all(thresholds.clear * left(lag_s) <= left(0.0))
-    return lag_s if is_foretold and abs(lag_s) > run.least_s else 0.0
+    nowhere = OneClock(0.0, 0.0)
+    is_foretold = np.all(thresholds.clear * left(found) <= left(known or nowhere))
+    return found if is_foretold and _farthest_s(run, found, nowhere) > run.least_s else None
 
 
-def _left(runs: Sequence[_Run]) -> float:
+def _moved_by(clock: OneClock, parts: Array) -> OneClock:
+    """A clock that is later by a lag and, if there are two ``parts``, grows more by a rate."""
+    return OneClock(clock.before_s + float(parts[0]), clock.rate + float(parts[1:].sum()))
+
+
+def _farthest_s(run: Run, one: OneClock, other: OneClock) -> float:
+    """By how much two clocks are apart at most."""
+    return float(np.max(np.abs(run.lag_s(one) - run.lag_s(other))))
+
+
+def _products(runs: Sequence[Run]) -> Array:
+    return np.asarray(np.sum([one.products for one in runs], axis=0))
+
+
+def _left(runs: Sequence[Run]) -> float:
     """Squares of what is read that all together do not foretell."""
-    products = np.sum([one.products for one in runs], axis=0)
+    products = _products(runs)
     return float(sum(np.sum(one.read**2) for one in runs) - products[:, -1] @ _weights(products))
 
 

@@ -93,13 +93,13 @@ def align(view: View) -> tuple[View, Lags]:
     return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate), seen
 
 
-def clock_through(each: Sequence[Lags]) -> OneClock | None:
-    """One line through lags, in whichever recording (Theil 1950, Sen 1968); None where none is seen."""
+def clock_through(each: Sequence[Lags], rate: float | None = None) -> OneClock | None:
+    """One line through lags, in whichever recording (Theil 1950, Sen 1968), or of a ``rate``; None of no lags."""
     there = [one for one in each if one.at_s.size]
     if not there:
         return None
     at_s, lag_s = np.concatenate([one.at_s for one in there]), np.concatenate([one.lag_s for one in there])
-    rate = _slope(at_s, lag_s)
+    rate = _slope(at_s, lag_s) if rate is None else rate
     return OneClock(float(np.median(lag_s - rate * at_s)), rate)
 
 
@@ -127,21 +127,24 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``two_clocks``: every sample is late or early; nothing is masked."""
     if view.offset_s == 0.0 and view.rate == 0.0:
         return
-    half = 0.5 * float(view.time_s[-1] - view.time_s[0])
-    first, last = view.offset_s - view.rate * half, view.offset_s + view.rate * half
-    drift = abs(last - first) > _least_lag_s(view)
-    course = f" (from {first:+.2f} s at the start to {last:+.2f} s at the end)" if drift else ""
-    yield from_two_clocks(view.recording, view.offset_s, "than the unit's relaxation explains", course)
+    clock = OneClock(view.offset_s - 0.5 * view.rate * view.recording.duration_s, view.rate)
+    yield from_two_clocks(view.recording, clock, "than the unit's relaxation explains", _least_lag_s(view))
 
 
-def from_two_clocks(recording: Recording, offset_s: float, more: str, course: str = "") -> Finding:
-    """The finding of a reading that is late by ``offset_s``, ``more`` than something; ``course``: from when to when."""
+def from_two_clocks(recording: Recording, clock: OneClock, more: str, least_s: float = 0.0) -> Finding:
+    """The finding of a reading that is late by a ``clock``, ``more`` than something.
+
+    From when to when is said where it grows by more than ``least_s``.
+    """
+    first_s, middle_s, last_s = clock.lag_s(np.array([0.0, 0.5, 1.0]) * recording.duration_s)
+    is_drift = abs(last_s - first_s) > least_s
+    course = f" (from {first_s:+.2f} s at the start to {last_s:+.2f} s at the end)" if is_drift else ""
     return Finding(
         "two_clocks",
         np.ones(len(recording), dtype=bool),
-        f"load and reading come from two clocks: the reading is {abs(offset_s):.2f} s"
-        f" {'late' if offset_s >= 0 else 'early'}{course}, more {more} (record both by one clock, unless the unit is"
-        " itself that slow under such loads)",
+        f"load and reading come from two clocks: the reading is {abs(middle_s):.2f} s"
+        f" {'late' if middle_s >= 0 else 'early'}{course}, more {more} (record both"
+        " by one clock, unless the unit is itself that slow under such loads)",
     )
 
 

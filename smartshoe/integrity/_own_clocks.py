@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.arrays import Mask
-from smartshoe.integrity._apart import Told, apart_s
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity._apart import Run, apart_s, beside, is_better, refined, runs_of, unforetold
 from smartshoe.integrity._clocks import UNSEEN, Lags, clock_through, one_clock
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity.thresholds import Thresholds
@@ -31,15 +31,17 @@ class Alone:
 
 @dataclass(frozen=True, eq=False)
 class Clocks:
-    """``shared`` and ``others`` as ``one_clock`` and ``others`` in `Integrity`, ``offsets_s`` as ``clock_offset_s``.
+    """``shared`` and ``others`` as ``one_clock`` and ``others`` in `Integrity`.
 
-    ``found``: by place, how much later recordings follow than others that are fitted.
+    ``offsets_s`` and ``rates`` as ``clock_offset_s`` and ``clock_rate``. ``found``: by place, the clock by which later
+    recordings follow beside others that are fitted.
     """
 
     shared: OneClock | None
     others: frozenset[int]
     offsets_s: tuple[float, ...]
-    found: dict[int, float]
+    rates: tuple[float, ...]
+    found: dict[int, OneClock]
 
 
 def clocks_of(
@@ -47,36 +49,89 @@ def clocks_of(
 ) -> Clocks:
     """The clocks of ``recordings``, of which the first ``count`` are fitted and decide; the others go by them or not.
 
-    A recording that judges goes by other clocks where its lags are none of the clock that the fitted ones share.
+    A recording that judges goes by other clocks where its lags are none of the clock that the fitted ones share, and
+    it is foretold far better by its own.
     """
     there = [place for place, mask in enumerate(usable) if mask.any()]
-    fitted = [place for place in there if place < count]
-    seen = [alone[place].lags for place in fitted]
+    runs = runs_of(recordings, usable, count, thresholds)
+    fitted = _of_fitted([place for place in there if place < count], runs, alone, thresholds)
+    found, others, zero = {**fitted.found}, set(), fitted.shared or OneClock(0.0, 0.0)
+    offsets_s, rates = [one.offset_s for one in alone], [one.rate for one in alone]
+    for place, lag in fitted.found.items():
+        offsets_s[place] = lag.before_s
+    for place in (place for place in there if place >= count):
+        middle_s = np.array(0.5 * recordings[place].duration_s)
+        is_other, by = _of_judging(alone[place], runs.get(place), fitted, middle_s, thresholds)
+        if is_other:
+            others.add(place)
+        if by is not None:
+            found[place] = by
+            offsets_s[place], rates[place] = float(by.lag_s(middle_s) + zero.lag_s(middle_s)), by.rate + zero.rate
+    return Clocks(fitted.shared, frozenset(others), tuple(offsets_s), tuple(rates), found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """The clock that recordings ``shared``, if any, and those ``found`` of their own; ``runs`` that foretell others.
+
+    These are on each's own clock, or all on one ``clock``: that which is shared, where it is told, or where one unit
+    follows them far better by it.
+    """
+
+    shared: OneClock | None
+    found: dict[int, OneClock]
+    clock: OneClock | None
+    runs: list[Run]
+
+
+def _of_fitted(
+    places: Sequence[int], runs: Mapping[int, Run], alone: Sequence[Alone], thresholds: Thresholds
+) -> _Fitted:
+    """What recordings that are fitted tell of their clocks."""
+    runs = {place: runs[place] for place in places if place in runs}
+    seen = [alone[place].lags for place in places]
     shared = one_clock(seen, thresholds)
-    borne = shared if any(alone[place].is_told for place in fitted) else None
-    beside_s = [0.0 if borne is None else float(borne.lag_s(np.array(0.5 * one.duration_s))) for one in recordings]
-    own_s = {place: alone[place].offset_s for place in there if alone[place].offset_s}
-    drifting = {place for place in there if alone[place].rate}
-    apart, compared = {*there}, {*there} - drifting  # what drifts as no other does is put right by what it tells alone
-    if borne is not None:
-        judging = (place for place in there if place >= count and alone[place].lags.at_s.size)
-        apart = {place for place in judging if not _goes_by(borne, alone[place], thresholds)}
-        compared = {*fitted} | apart - drifting
-        own_s = {place: (own_s.get(place) or alone[place].lags.middle_s) - beside_s[place] for place in apart}
-    masks = [mask & (place in compared) for place, mask in enumerate(usable)]
-    told = Told(own_s, borne, count, clock_through(seen))
-    found = apart_s(recordings, masks, [one.lags for one in alone], thresholds, told)
-    if borne is None and shared is not None:  # what parts slowly is farther apart the longer a recording lasts
-        found = {place: by for place, by in found.items() if not _goes_by(shared, alone[place], thresholds)}
-    others = {place for place in apart if place >= count and (place in found or alone[place].is_told)}
-    return Clocks(
-        None if any(place < count for place in found) else shared,
-        frozenset(others),
-        tuple(found[place] + beside_s[place] if place in found else one.offset_s for place, one in enumerate(alone)),
-        found,
-    )
+    if shared is not None:
+        shared = refined(shared, seen, [*runs.values()], thresholds)
+    if shared is not None and any(alone[place].is_told for place in places):
+        return _Fitted(shared, {}, shared, [run.on(shared) for run in runs.values()])
+    runs = {place: run for place, run in runs.items() if not alone[place].rate}  # that is put right as it was told
+    own_s = {place: alone[place].offset_s for place in runs if alone[place].offset_s}
+    apart = apart_s(runs, [one.lags for one in alone], thresholds, own_s, shared or clock_through(seen))
+    if shared is not None:  # what parts slowly is farther apart the longer a recording lasts
+        apart = {place: lag_s for place, lag_s in apart.items() if not alone[place].lags.are_of(shared, thresholds)}
+    moved = [run.earlier(apart.get(place) or alone[place].offset_s) for place, run in runs.items()]
+    found = {place: OneClock(lag_s, 0.0) for place, lag_s in apart.items()}
+    if shared is None or found:
+        return _Fitted(None, found, None, moved)
+    is_likelier = bool(runs) and thresholds.clear * unforetold([*runs.values()], shared) < unforetold(moved)
+    clock = shared if is_likelier else None
+    return _Fitted(shared, {}, clock, [run.on(clock) for run in moved])
 
 
-def _goes_by(clock: OneClock, alone: Alone, thresholds: Thresholds) -> bool:
-    """Whether lags are seen that are those of a ``clock``."""
-    return bool(alone.lags.at_s.size) and alone.lags.are_of(clock, thresholds)
+def _of_judging(
+    alone: Alone, run: Run | None, fitted: _Fitted, middle_s: Array, thresholds: Thresholds
+) -> tuple[bool, OneClock | None]:
+    """Whether a recording goes by another clock than those that are fitted; which beside theirs, if not as it tells.
+
+    Theirs is its own where its lags lie on it, and where none are seen.
+    """
+    theirs = fitted.clock or OneClock(0.0, 0.0)
+    if fitted.clock is not None and (not alone.lags.at_s.size or alone.lags.are_of(theirs, thresholds)):
+        return False, None
+    if run is None or not fitted.runs:
+        return alone.is_told, None
+    told = OneClock(alone.offset_s - alone.rate * float(middle_s), alone.rate)
+    seen = told
+    if fitted.clock is not None and not alone.is_told:  # that none is told alone is told as well
+        seen = clock_through([alone.lags]) or told
+    lag_s = float(seen.lag_s(middle_s) - theirs.lag_s(middle_s))
+    by = beside(run.on(fitted.clock), fitted.runs, thresholds, lag_s, _less(seen, theirs))
+    if by is None and alone.is_told:
+        return is_better(_less(told, theirs), run.on(fitted.clock), fitted.runs), None
+    return by is not None, by
+
+
+def _less(one: OneClock, other: OneClock) -> OneClock:
+    """A clock beside another."""
+    return OneClock(one.before_s - other.before_s, one.rate - other.rate)

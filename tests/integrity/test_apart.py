@@ -13,11 +13,13 @@ from scipy.signal import lfilter
 from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._aligned import aligned
+from smartshoe.diagnosis._aligned import Aligned, aligned
 from smartshoe.integrity import Integrity, OneClock, examine
-from smartshoe.integrity._apart import Told, apart_s
-from smartshoe.integrity._clocks import UNSEEN, Lags
-from smartshoe.integrity._own_clocks import Alone, clocks_of
+from smartshoe.integrity._apart import apart_s, beside, refined, runs_of
+from smartshoe.integrity._clocks import UNSEEN, Lags, align, from_two_clocks
+from smartshoe.integrity._examination import _view
+from smartshoe.integrity._own_clocks import Alone, Clocks, clocks_of
+from smartshoe.integrity._view import UNKNOWN_ENDS
 
 Array = NDArray[np.float64]
 
@@ -51,9 +53,18 @@ def _apart(
     lags: tuple[Lags, ...] | None = None,
     own_s: dict[int, float] | None = None,
     fitted: int | None = None,
+    perhaps: OneClock | None = None,
 ) -> dict[int, float]:
-    told = Told(own_s or {}, None, len(runs) if fitted is None else fitted)
-    return apart_s(runs, [one.sensor.present for one in runs], lags or (UNSEEN,) * len(runs), STANDARD, told)
+    count = len(runs) if fitted is None else fitted
+    compared = runs_of(runs, [one.sensor.present for one in runs], count, STANDARD)
+    foretelling = {place: run for place, run in compared.items() if place < count}
+    found = apart_s(foretelling, lags or (UNSEEN,) * len(runs), STANDARD, own_s or {}, perhaps)
+    for place, run in compared.items():
+        if place >= count and foretelling:
+            nowhere = OneClock(0.0, 0.0)
+            by = beside(run, [*foretelling.values()], STANDARD, 0.0, nowhere)
+            found |= {} if by is None else {place: by.before_s}
+    return found
 
 
 @pytest.mark.parametrize("late_s", [-0.15, -0.1, 0.1, 0.15])
@@ -132,12 +143,10 @@ def test_lags_of_one_pair_of_clocks_that_part_are_not_those_of_one_recording() -
     """The longer a recording, the later it is: moved by a lag of its own it is foretold no better than by the clock."""
     rate = 0.002
     runs = [_run(0.0, seed, rate=rate, cycles=cycles) for seed, cycles in enumerate((30, 6, 6, 6))]
-    of_its_own, by_the_clock = (Told({}, None, len(runs), clock) for clock in (None, OneClock(0.0, rate)))
-    masks, unseen = [one.sensor.present for one in runs], (UNSEEN,) * len(runs)
-    assert apart_s(runs, masks, unseen, STANDARD, of_its_own) == {0: pytest.approx(0.064, abs=0.01)}
-    assert apart_s(runs, masks, unseen, STANDARD, by_the_clock) == {}
+    assert _apart(*runs) == {0: pytest.approx(0.064, abs=0.01)}
+    assert _apart(*runs, perhaps=OneClock(0.0, rate)) == {}
     late = [_run(0.15 if seed == 2 else 0.0, seed) for seed in range(4)]
-    assert list(apart_s(late, [one.sensor.present for one in late], unseen, STANDARD, by_the_clock)) == [2]
+    assert list(_apart(*late, perhaps=OneClock(0.0, rate))) == [2]
 
 
 @cache
@@ -223,19 +232,118 @@ def test_what_is_held_out_does_not_tell_of_two_fitted_recordings_which_is_late()
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.5])
-def test_one_that_judges_and_drifts_by_itself_is_moved_by_what_it_tells_alone(late_s: float) -> None:
-    runs = [_run(late_s, seed) for seed in range(2)] + [_run(0.3, 5)]
-    at_s = np.array([20.0, 30.0, 40.0])
-    alone = [Alone(late_s, 0.0, Lags(at_s, np.full(3, late_s)))] * 2 + [Alone(0.3, 0.01, Lags(at_s, 0.01 * at_s))]
-    usable = [np.ones(len(one), dtype=bool) for one in runs]
+@pytest.mark.parametrize("is_short", [False, True])
+def test_one_that_judges_and_drifts_by_itself_is_moved_by_what_it_tells(late_s: float, is_short: bool) -> None:
+    """By what the fitted ones foretell about what it tells alone; where they foretell nothing, by that as it is."""
+    runs = [_run(late_s, seed) for seed in range(2)] + [_run(0.1, 5, rate=0.01)]
+    middle_s = 0.1 + 0.005 * runs[2].duration_s
+    at_s = np.array([5.0, 15.0, 40.0])
+    alone = [Alone(late_s, 0.0, Lags(at_s, np.full(3, late_s)))] * 2
+    alone += [Alone(middle_s + 0.02, 0.009, Lags(at_s, 0.1 + 0.01 * at_s))]
+    usable = [np.arange(len(one)) < (50 if one is runs[2] and is_short else len(one)) for one in runs]
     found = clocks_of(runs, usable, alone, 2, STANDARD)
-    assert (found.shared, found.others, found.found) == (OneClock(late_s, 0.0), frozenset([2]), {})
-    assert found.offsets_s == (late_s, late_s, 0.3)
-    rates = tuple(one.rate for one in alone)
-    integrity = Integrity(tuple(runs), (), tuple(usable), found.offsets_s, rates, found.shared, (), found.others)
-    ready = aligned(runs, integrity)
+    assert (found.shared, found.others) == (OneClock(late_s, 0.0), frozenset([2]))
+    if is_short:
+        assert (found.offsets_s, found.rates) == ((late_s, late_s, middle_s + 0.02), (0.0, 0.0, 0.009))
+        assert found.found == {}
+    else:
+        assert found.offsets_s == (late_s, late_s, pytest.approx(middle_s, abs=0.006))
+        assert found.rates == (0.0, 0.0, pytest.approx(0.01, rel=0.02))
+    ready = _ready(runs, found, usable)
     assert ready.moved == {2}
-    assert f"{0.3 - late_s:.3g}".lstrip("-") in ready.says[0]
+    assert f"{abs(found.offsets_s[2] - late_s):.3g} s " in ready.says[0]
+    assert f"by {found.rates[2]:.2g} s " in ready.says[0]
+
+
+def _ready(runs: list[Recording], found: Clocks, usable: list[NDArray[np.bool_]] | None = None) -> Aligned:
+    masks = usable or [np.ones(len(one), dtype=bool) for one in runs]
+    return aligned(
+        runs, Integrity(tuple(runs), (), tuple(masks), found.offsets_s, found.rates, found.shared, (), found.others)
+    )
+
+
+def _clocks(runs: list[Recording], count: int) -> Clocks:
+    """As `examine` finds them, with the rates."""
+    alone = []
+    for one in runs:
+        view = _view(one, STANDARD, UNKNOWN_ENDS)
+        assert view is not None
+        view, seen = align(view)
+        alone.append(Alone(view.offset_s, view.rate, seen))
+    return clocks_of(runs, [one.sensor.present for one in runs], alone, count, STANDARD)
+
+
+@pytest.mark.parametrize("rate", [0.003, -0.003, 0.0005, -0.0005])
+@pytest.mark.parametrize("late_s", [0.0, 0.3])
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_that_judges_and_is_in_time_does_not_go_by_clocks_of_the_fitted_that_part(
+    rate: float, late_s: float, count: int
+) -> None:
+    """It is made as late as they are, moment by moment, so that the model that bears their clock reads it right."""
+    fitted = [_run(late_s, seed, rate=rate, cycles=60) for seed in range(count)]
+    runs = [*fitted, _run(0.0, 7, cycles=50)]
+    found = _clocks(runs, count)
+    assert found.others == {count}
+    assert found.shared == OneClock(pytest.approx(late_s, abs=0.05), pytest.approx(rate, abs=5e-5))
+    assert found.rates[count] == pytest.approx(0.0, abs=5e-5)
+    ready = _ready(runs, found)
+    moved, usable = ready.recordings[count], ready.usable[count]
+    as_they = _run(late_s, 7, rate=rate, cycles=50)
+    assert np.std((moved.sensor.values - as_they.sensor.values)[usable]) < 0.5
+    assert np.std(runs[count].sensor.values - as_they.sensor.values) > 1.0
+
+
+@pytest.mark.parametrize("rate", [0.003, 0.0005])
+def test_one_that_judges_and_parts_as_the_fitted_do_goes_by_their_clock(rate: float) -> None:
+    runs = [_run(0.0, seed, rate=rate, cycles=60) for seed in range(3)]
+    found = _clocks(runs, 2)
+    assert (found.others, found.found) == (frozenset(), {})
+
+
+@pytest.mark.parametrize("rate", [0.003, -0.0006])
+def test_one_that_judges_and_parts_slowly_from_its_load_is_told_by_how_much(rate: float) -> None:
+    """By a tenth of a second in three minutes, too little to be told alone."""
+    runs = [*(_run(0.0, seed, cycles=60) for seed in range(2)), _run(0.0, 7, rate=rate, cycles=50)]
+    found = _clocks(runs, 2)
+    assert found.others == {2}
+    assert found.rates == (0.0, 0.0, pytest.approx(rate, rel=0.03))
+    assert found.offsets_s[2] == pytest.approx(0.5 * rate * runs[2].duration_s, abs=0.003)
+    assert "s at the end" in from_two_clocks(runs[2], found.found[2], "").says
+
+
+def test_a_rate_is_told_in_the_place_of_a_delay_only_where_one_unit_follows_far_better_by_it() -> None:
+    at_s = np.array([120.0, 150.0, 180.0])
+    for rate in (0.003, 0.0):
+        run = _run(0.4 - 150.0 * rate, 3, rate=rate, cycles=60)
+        seen = [Lags(at_s, 0.4 + 0.9 * rate * (at_s - 150.0))]
+        compared = [*runs_of([run], [run.sensor.present], 1, STANDARD).values()]
+        plain = OneClock(0.4, 0.0)
+        found = refined(plain, seen, compared, STANDARD)
+        assert found == (OneClock(pytest.approx(-0.05, abs=0.02), pytest.approx(0.003, rel=0.02)) if rate else plain)
+        assert refined(plain, seen, [], STANDARD) == plain
+
+
+@pytest.mark.parametrize("knee", [0.06, 0.1])
+def test_steps_that_judge_ramps_of_a_bent_unit_are_in_time(knee: float) -> None:
+    """Nor is what is judged moved by a lag by which one unit follows all of them no better."""
+    lasts_s, levels = np.repeat([5.0, 2.5], 6), np.repeat([0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0], 2)
+
+    def curve(share: Array) -> Array:
+        return np.asarray(np.maximum(share - knee, 0.0))
+
+    ramps = _bent([0.0, 1.0, *(1.0 + np.cumsum(lasts_s))], [0.0, 0.0, *[1.0, 0.0] * 6], curve, "ramps")
+    steps = _bent([0.0, 1.0, *(1.0 + np.cumsum([0.1, 2.0] * 8))], [0.0, 0.0, *levels], curve, "steps")
+    assert examine([ramps, steps], STANDARD, 1).others == frozenset()
+
+
+def test_one_that_judges_and_tells_a_lag_goes_by_the_fitted_ones_clock_where_its_own_is_no_better() -> None:
+    """What a unit relaxes by is no lag of a clock: the fitted ones tell 0.66 s, and it tells 0.56 s of as many."""
+    case = hide({"second_relaxation": 2.0}, protocol="rates", seed=43, recordings=2)
+    late = [_late(one, 0.5) for one in (*case.recordings, *case.hold_out)]
+    assert examine(late[2:], STANDARD).clock_offset_s[0] > 0.3
+    found = examine(late, STANDARD, 2)
+    assert found.others == frozenset()
+    assert aligned(found.recordings, found).moved == frozenset()
 
 
 # -- long ones --------------------------------------------------------------------------------------------------------

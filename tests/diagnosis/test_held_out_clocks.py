@@ -1,0 +1,43 @@
+"""A recording that judges is judged on its own clock, whatever clock those that are fitted go by."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from simulators.hidden.recordings import HiddenCase, hide
+from smartshoe.diagnosis import diagnose
+from smartshoe.recording import Recording
+
+
+@cache
+def _sound() -> HiddenCase:
+    return hide({}, protocol="mixed", seed=40, recordings=2)
+
+
+def _parting(recording: Recording, rate: float) -> Recording:
+    """The reading of a logger whose clock falls behind by ``rate`` s a second."""
+    time_s, sensor = recording.time_s, recording.sensor
+    shown_s = np.clip(time_s - rate * (time_s - time_s[0]), time_s[0], time_s[-1])
+    return recording.with_channel(sensor.with_values(CubicSpline(time_s, sensor.values)(shown_s)))
+
+
+@pytest.mark.parametrize("rate", [0.003, -0.0005])
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_sound_recording_is_judged_as_well_beside_fitted_ones_whose_clocks_part(rate: float, count: int) -> None:
+    case = _sound()
+    fitted = [_parting(one, rate) for one in case.recordings[:count]]
+    found, plain = diagnose(fitted, case.hold_out), diagnose(case.recordings[:count], case.hold_out)
+    assert found.verdict == "explained"
+    cause = found.causes[0]
+    assert cause.name == "clock_drift"
+    assert cause.parameters["clock_rate_error"].value == pytest.approx(rate, rel=0.1)
+    assert found.extended is not None
+    assert plain.baseline is not None
+    assert found.extended.rmse < 1.2 * plain.baseline.rmse
+    assert not any("another unit" in said or "is worse than" in said for said in found.limits)
+    (said,) = [said for said in found.limits if "was moved" in said]
+    assert " more each second, to the clock of the recordings that are fitted, before it judges" in said
