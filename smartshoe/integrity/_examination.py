@@ -99,10 +99,10 @@ def examine(
     usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
     put_right = [_put_right(*one, decided) for one in zip(tamed, examined, usable, strict=True)]
     clocks = clocks_of([one for one, _ in put_right], usable, [one.alone for one in examined], count, decided)
-    for place, lag_s in clocks.found.items():
+    for place, clock in clocks.found.items():
         recording, findings = put_right[place]
         findings[:] = [one for one in findings if one.kind != "two_clocks"]
-        findings.append(from_two_clocks(recording, lag_s, "than in the other recordings"))
+        findings.append(from_two_clocks(recording, clock, "than in the other recordings"))
     return Integrity(
         tuple(recording for recording, _ in put_right),
         tuple(
@@ -112,7 +112,7 @@ def examine(
         ),
         tuple(usable),
         clocks.offsets_s,
-        tuple(one.alone.rate for one in examined),
+        clocks.rates,
         clocks.shared,
         tuple(why for why in refused if why is not None),
         clocks.others,
