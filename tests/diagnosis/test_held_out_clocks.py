@@ -41,3 +41,15 @@ def test_a_sound_recording_is_judged_as_well_beside_fitted_ones_whose_clocks_par
     assert not any("another unit" in said or "is worse than" in said for said in found.limits)
     (said,) = [said for said in found.limits if "was moved" in said]
     assert " more each second, to the clock of the recordings that are fitted, before it judges" in said
+
+
+@pytest.mark.parametrize("rate", [0.003, 0.0005])
+def test_a_recording_whose_clock_parts_is_judged_on_that_of_the_fitted_ones(rate: float) -> None:
+    case = _sound()
+    held_out = [_parting(one, rate) for one in case.hold_out]
+    found, plain = diagnose(case.recordings, held_out), diagnose(case.recordings, case.hold_out)
+    assert found.baseline is not None
+    assert plain.baseline is not None
+    assert found.baseline.rmse < 1.2 * plain.baseline.rmse
+    assert any("was moved" in said and "before it judges" in said for said in found.limits)
+    assert not any("another unit" in said for said in found.limits)
