@@ -25,9 +25,9 @@ STEPS = 4  # of Gauss and Newton: a lag within what the smoothing spans is found
 
 
 @on_one_thread
-def runs_of(
+def increments_of(
     recordings: Sequence[Recording], usable: Sequence[Mask], count: int, thresholds: Thresholds
-) -> dict[int, Run]:
+) -> dict[int, Increments]:
     """By place, what is compared of recordings, of which the first ``count`` foretell; none where nothing can tell."""
     of_use = [place for place, mask in enumerate(usable) if mask.sum() >= thresholds.least_samples]
     fitted = [place for place in of_use if place < count]
@@ -44,7 +44,7 @@ def runs_of(
 
 
 @on_one_thread
-def refined(clock: OneClock, seen: Sequence[Lags], runs: Sequence[Run], thresholds: Thresholds) -> OneClock:
+def refined(clock: OneClock, seen: Sequence[Lags], runs: Sequence[Increments], thresholds: Thresholds) -> OneClock:
     """The ``clock`` that recordings share, or the line through lags that are ``seen`` by which one unit follows best.
 
     Its rate is what one unit tells, and its lags are those that are seen: what is late by a little a unit may make
@@ -58,7 +58,7 @@ def refined(clock: OneClock, seen: Sequence[Lags], runs: Sequence[Run], threshol
     return line if line is not None and least * unforetold(runs, line) < unforetold(runs, plain) else clock
 
 
-def _refined(about: OneClock, parts: int, runs: Sequence[Run], thresholds: Thresholds) -> OneClock:
+def _refined(about: OneClock, parts: int, runs: Sequence[Increments], thresholds: Thresholds) -> OneClock:
     """A clock of so many ``parts``, as in `_later`, by which one unit follows best; ``about`` itself if it is far."""
     found = about
     for _ in range(STEPS):
@@ -72,14 +72,14 @@ def _refined(about: OneClock, parts: int, runs: Sequence[Run], thresholds: Thres
     return found
 
 
-def unforetold(runs: Sequence[Run], clock: OneClock | None = None) -> float:
+def unforetold(runs: Sequence[Increments], clock: OneClock | None = None) -> float:
     """Squares of what is read that one unit does not foretell, by a clock that all go by."""
     return _left([run.on(clock) for run in runs])
 
 
 @on_one_thread
 def apart_s(
-    runs: Mapping[int, Run],
+    runs: Mapping[int, Increments],
     lags: Sequence[Lags],
     thresholds: Thresholds,
     own_s: Mapping[int, float],
@@ -109,7 +109,9 @@ def apart_s(
 
 
 @on_one_thread
-def beside(run: Run, others: Sequence[Run], thresholds: Thresholds, own_s: float, own: OneClock) -> OneClock | None:
+def beside(
+    run: Increments, others: Sequence[Increments], thresholds: Thresholds, own_s: float, own: OneClock
+) -> OneClock | None:
     """The clock by which a recording follows beside the ``others`` that foretell it, or None where it goes by theirs.
 
     A lag about ``own_s``; a line about ``own`` where it is foretold far better still by that.
@@ -121,12 +123,12 @@ def beside(run: Run, others: Sequence[Run], thresholds: Thresholds, own_s: float
     return found if found is not None and is_better(found, run, others) else None
 
 
-def is_better(clock: OneClock, run: Run, others: Sequence[Run]) -> bool:
+def is_better(clock: OneClock, run: Increments, others: Sequence[Increments]) -> bool:
     """Whether one unit follows a recording and the ``others`` better if it goes by a clock of its own."""
     return _left([*others, run.on(clock)]) < _left([*others, run])
 
 
-def _of_first(runs: Mapping[int, Run], lags: Sequence[Lags], thresholds: Thresholds) -> dict[int, float]:
+def _of_first(runs: Mapping[int, Increments], lags: Sequence[Lags], thresholds: Thresholds) -> dict[int, float]:
     """The same of recordings of which no lag is told."""
     if len(runs) < 2:
         return {}
@@ -145,7 +147,7 @@ def _of_first(runs: Mapping[int, Run], lags: Sequence[Lags], thresholds: Thresho
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Increments:
     """What is compared of a recording, over even bins at ``grid`` (b,).
 
     ``made`` (b, k): increments of what a unit may make of its load; ``read`` (b,): those of its reading. ``began_s``:
@@ -163,11 +165,11 @@ class Run:
         """(k, k + 1) inner products of what is made of the load, with itself and with the reading."""
         return np.asarray(self.made.T @ np.column_stack([self.made, self.read]))
 
-    def earlier(self, by_s: float) -> Run:
+    def earlier(self, by_s: float) -> Increments:
         """The same with its reading earlier."""
         return self.on(OneClock(by_s, 0.0)) if by_s else self
 
-    def on(self, clock: OneClock | None) -> Run:
+    def on(self, clock: OneClock | None) -> Increments:
         """The same with its reading earlier by the lag of a clock."""
         return (
             self
@@ -191,7 +193,7 @@ class Run:
 
 def _run(
     recording: Recording, usable: Mask, step_s: float, ends_n: tuple[float, float], thresholds: Thresholds
-) -> Run | None:
+) -> Increments | None:
     """None of a recording that lasts for a few bins: beside one of a day a minute tells nothing of moments."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -208,10 +210,10 @@ def _run(
     smooth = max(thresholds.echo_s / step_s, 1.0)
     made = made_of((load - ends_n[0]) / (ends_n[1] - ends_n[0]), step_s, smooth, thresholds)
     read, least_s = gaussian_filter1d(reading, smooth, order=1), thresholds.few * recording.sample_time_s
-    return Run(grid, made, read, float(recording.time_s[0]), least_s)
+    return Increments(grid, made, read, float(recording.time_s[0]), least_s)
 
 
-def _of_others(runs: Sequence[Run]) -> list[Array]:
+def _of_others(runs: Sequence[Increments]) -> list[Array]:
     """For each of them the sum of all others' products: of those before it and of those after it."""
     products = np.array([one.products for one in runs])
     nothing = np.zeros_like(products[:1])
@@ -220,14 +222,14 @@ def _of_others(runs: Sequence[Run]) -> list[Array]:
     return [*(before + after)]
 
 
-def _later_s(run: Run, others: Array, thresholds: Thresholds, own_s: float = 0.0) -> float:
+def _later_s(run: Increments, others: Array, thresholds: Thresholds, own_s: float = 0.0) -> float:
     """How much later one reading follows than the ``others``, by their products, foretell; about ``own_s``, or 0."""
     found = _later(run, run.made @ _weights(others), thresholds, OneClock(own_s, 0.0), 1)
     return 0.0 if found is None else found.before_s
 
 
 def _later(
-    run: Run, foretold: Array, thresholds: Thresholds, about: OneClock, parts: int, known: OneClock | None = None
+    run: Increments, foretold: Array, thresholds: Thresholds, about: OneClock, parts: int, known: OneClock | None = None
 ) -> OneClock | None:
     """The clock by which a reading follows what is ``foretold`` (b,), about another: a lag, or a line of two ``parts``.
 
@@ -259,16 +261,16 @@ def _moved_by(clock: OneClock, parts: Array) -> OneClock:
     return OneClock(clock.before_s + float(parts[0]), clock.rate + float(parts[1:].sum()))
 
 
-def _farthest_s(run: Run, one: OneClock, other: OneClock) -> float:
+def _farthest_s(run: Increments, one: OneClock, other: OneClock) -> float:
     """By how much two clocks are apart at most."""
     return float(np.max(np.abs(run.lag_s(one) - run.lag_s(other))))
 
 
-def _products(runs: Sequence[Run]) -> Array:
+def _products(runs: Sequence[Increments]) -> Array:
     return np.asarray(np.sum([one.products for one in runs], axis=0))
 
 
-def _left(runs: Sequence[Run]) -> float:
+def _left(runs: Sequence[Increments]) -> float:
     """Squares of what is read that all together do not foretell."""
     products = _products(runs)
     return float(sum(np.sum(one.read**2) for one in runs) - products[:, -1] @ _weights(products))

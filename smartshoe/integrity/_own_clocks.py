@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.integrity._apart import Run, apart_s, beside, is_better, refined, runs_of, unforetold
+from smartshoe.integrity._apart import Increments, apart_s, beside, increments_of, is_better, refined, unforetold
 from smartshoe.integrity._clocks import UNSEEN, Lags, clock_through, one_clock
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity.thresholds import Thresholds
@@ -53,7 +53,7 @@ def clocks_of(
     it is foretold far better by its own.
     """
     there = [place for place, mask in enumerate(usable) if mask.any()]
-    runs = runs_of(recordings, usable, count, thresholds)
+    runs = increments_of(recordings, usable, count, thresholds)
     fitted = _of_fitted([place for place in there if place < count], runs, alone, thresholds)
     found, others, zero = {**fitted.found}, set(), fitted.shared or OneClock(0.0, 0.0)
     offsets_s, rates = [one.offset_s for one in alone], [one.rate for one in alone]
@@ -71,7 +71,7 @@ def clocks_of(
 
 
 @dataclass(frozen=True, eq=False)
-class _Fitted:
+class _Reference:
     """The clock that recordings ``shared``, if any, and those ``found`` of their own; ``runs`` that foretell others.
 
     These are on each's own clock, or all on one ``clock``: that which is shared, where it is told, or where one unit
@@ -81,12 +81,12 @@ class _Fitted:
     shared: OneClock | None
     found: dict[int, OneClock]
     clock: OneClock | None
-    runs: list[Run]
+    runs: list[Increments]
 
 
 def _of_fitted(
-    places: Sequence[int], runs: Mapping[int, Run], alone: Sequence[Alone], thresholds: Thresholds
-) -> _Fitted:
+    places: Sequence[int], runs: Mapping[int, Increments], alone: Sequence[Alone], thresholds: Thresholds
+) -> _Reference:
     """What recordings that are fitted tell of their clocks."""
     runs = {place: runs[place] for place in places if place in runs}
     seen = [alone[place].lags for place in places]
@@ -94,7 +94,7 @@ def _of_fitted(
     if shared is not None:
         shared = refined(shared, seen, [*runs.values()], thresholds)
     if shared is not None and any(alone[place].is_told for place in places):
-        return _Fitted(shared, {}, shared, [run.on(shared) for run in runs.values()])
+        return _Reference(shared, {}, shared, [run.on(shared) for run in runs.values()])
     runs = {place: run for place, run in runs.items() if not alone[place].rate}  # that is put right as it was told
     own_s = {place: alone[place].offset_s for place in runs if alone[place].offset_s}
     apart = apart_s(runs, [one.lags for one in alone], thresholds, own_s, shared or clock_through(seen))
@@ -103,14 +103,14 @@ def _of_fitted(
     moved = [run.earlier(apart.get(place) or alone[place].offset_s) for place, run in runs.items()]
     found = {place: OneClock(lag_s, 0.0) for place, lag_s in apart.items()}
     if shared is None or found:
-        return _Fitted(None, found, None, moved)
+        return _Reference(None, found, None, moved)
     is_likelier = bool(runs) and thresholds.clear * unforetold([*runs.values()], shared) < unforetold(moved)
     clock = shared if is_likelier else None
-    return _Fitted(shared, {}, clock, [run.on(clock) for run in moved])
+    return _Reference(shared, {}, clock, [run.on(clock) for run in moved])
 
 
 def _of_judging(
-    alone: Alone, run: Run | None, fitted: _Fitted, middle_s: Array, thresholds: Thresholds
+    alone: Alone, run: Increments | None, fitted: _Reference, middle_s: Array, thresholds: Thresholds
 ) -> tuple[bool, OneClock | None]:
     """Whether a recording goes by another clock than those that are fitted; which beside theirs, if not as it tells.
 

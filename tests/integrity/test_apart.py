@@ -15,7 +15,7 @@ from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import Aligned, aligned
 from smartshoe.integrity import Integrity, OneClock, examine
-from smartshoe.integrity._apart import apart_s, beside, refined, runs_of
+from smartshoe.integrity._apart import apart_s, beside, increments_of, refined
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, from_two_clocks
 from smartshoe.integrity._examination import _view
 from smartshoe.integrity._own_clocks import Alone, Clocks, clocks_of
@@ -56,7 +56,7 @@ def _apart(
     perhaps: OneClock | None = None,
 ) -> dict[int, float]:
     count = len(runs) if fitted is None else fitted
-    compared = runs_of(runs, [one.sensor.present for one in runs], count, STANDARD)
+    compared = increments_of(runs, [one.sensor.present for one in runs], count, STANDARD)
     foretelling = {place: run for place, run in compared.items() if place < count}
     found = apart_s(foretelling, lags or (UNSEEN,) * len(runs), STANDARD, own_s or {}, perhaps)
     for place, run in compared.items():
@@ -316,7 +316,7 @@ def test_a_rate_is_told_in_the_place_of_a_delay_only_where_one_unit_follows_far_
     for rate in (0.003, 0.0):
         run = _run(0.4 - 150.0 * rate, 3, rate=rate, cycles=60)
         seen = [Lags(at_s, 0.4 + 0.9 * rate * (at_s - 150.0))]
-        compared = [*runs_of([run], [run.sensor.present], 1, STANDARD).values()]
+        compared = [*increments_of([run], [run.sensor.present], 1, STANDARD).values()]
         plain = OneClock(0.4, 0.0)
         found = refined(plain, seen, compared, STANDARD)
         assert found == (OneClock(pytest.approx(-0.05, abs=0.02), pytest.approx(0.003, rel=0.02)) if rate else plain)
