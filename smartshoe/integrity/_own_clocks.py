@@ -75,13 +75,14 @@ class _Reference:
     """The clock that recordings ``shared``, if any, and those ``found`` of their own; ``runs`` that foretell others.
 
     These are on each's own clock, or all on one ``clock``: that which is shared, where it is told, or where one unit
-    follows them far better by it.
+    follows them far better by it. ``perhaps``: else one that all may go by, if it tells as much as clocks of their own.
     """
 
     shared: OneClock | None
     found: dict[int, OneClock]
     clock: OneClock | None
     runs: list[Increments]
+    perhaps: OneClock | None = None
 
 
 def _of_fitted(
@@ -97,16 +98,17 @@ def _of_fitted(
         return _Reference(shared, {}, shared, [run.on(shared) for run in runs.values()])
     runs = {place: run for place, run in runs.items() if not alone[place].rate}  # that is put right as it was told
     own_s = {place: alone[place].offset_s for place in runs if alone[place].offset_s}
-    apart = apart_s(runs, [one.lags for one in alone], thresholds, own_s, shared or clock_through(seen))
+    perhaps = shared or clock_through(seen)
+    apart = apart_s(runs, [one.lags for one in alone], thresholds, own_s, perhaps)
     if shared is not None:  # what parts slowly is farther apart the longer a recording lasts
         apart = {place: lag_s for place, lag_s in apart.items() if not alone[place].lags.are_of(shared, thresholds)}
     moved = [run.earlier(apart.get(place) or alone[place].offset_s) for place, run in runs.items()]
     found = {place: OneClock(lag_s, 0.0) for place, lag_s in apart.items()}
     if shared is None or found:
-        return _Reference(None, found, None, moved)
+        return _Reference(None, found, None, moved, None if found or own_s else perhaps)
     is_likelier = bool(runs) and thresholds.clear * unforetold([*runs.values()], shared) < unforetold(moved)
     clock = shared if is_likelier else None
-    return _Reference(shared, {}, clock, [run.on(clock) for run in moved])
+    return _Reference(shared, {}, clock, [run.on(clock) for run in moved], None if is_likelier or own_s else shared)
 
 
 def _of_judging(
@@ -127,6 +129,9 @@ def _of_judging(
         seen = clock_through([alone.lags]) or told
     lag_s = float(seen.lag_s(middle_s) - theirs.lag_s(middle_s))
     by = beside(run.on(fitted.clock), fitted.runs, thresholds, lag_s, _less(seen, theirs))
+    if by is not None and fitted.perhaps is not None:  # what all may do by one clock is none of its own
+        all_alike = unforetold([*fitted.runs, run], fitted.perhaps)
+        by = by if unforetold([*fitted.runs, run.on(by)]) < all_alike else None
     if by is None and alone.is_told:
         return is_better(_less(told, theirs), run.on(fitted.clock), fitted.runs), None
     return by is not None, by

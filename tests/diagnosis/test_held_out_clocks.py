@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe.diagnosis import diagnose
+from smartshoe.integrity import examine
 from smartshoe.recording import Recording
 
 
@@ -53,3 +54,21 @@ def test_a_recording_whose_clock_parts_is_judged_on_that_of_the_fitted_ones(rate
     assert found.baseline.rmse < 1.2 * plain.baseline.rmse
     assert any("was moved" in said and "before it judges" in said for said in found.limits)
     assert not any("another unit" in said for said in found.limits)
+
+
+@pytest.mark.parametrize(
+    ("fitted", "judging", "seed"),
+    [
+        ("minor_loops", "holds", 40),
+        ("minor_loops", "shuffled", 41),
+        ("staircase", "recovery", 41),
+        ("mixed", "rates", 40),
+    ],
+)
+def test_a_recording_whose_clock_parts_as_those_of_the_fitted_ones_do_is_on_their_clock(
+    fitted: str, judging: str, seed: int
+) -> None:
+    """None of them tells it alone: beside others that part as it does, a line of its own halves what is left of it."""
+    first, later = (hide({}, protocol=one, seed=seed, recordings=2) for one in (fitted, judging))
+    alike = [_parting(one, 0.0005) for one in (*first.recordings, later.hold_out[0])]
+    assert not examine(alike, count=len(first.recordings)).others
