@@ -97,7 +97,7 @@ def apart_s(
     if found:  # foretold at other loads than the others had: one unit must follow all of them better by these lags
         alike = [runs[place] for place in first]
         moved = [runs[place].earlier(found.get(place, 0.0)) for place in first]
-        if min(unforetold(alike), unforetold(alike, perhaps)) <= _left(moved):
+        if not is_better(moved, alike, perhaps):
             found = {}
     known = [runs[place].earlier(found.get(place, 0.0)) for place in first]
     for place in sorted((k for k in runs if k in own_s), key=lambda k: abs(own_s[k])):
@@ -110,22 +110,33 @@ def apart_s(
 
 @on_one_thread
 def beside(
-    run: Increments, others: Sequence[Increments], thresholds: Thresholds, own_s: float, own: OneClock
+    run: Increments,
+    others: Sequence[Increments],
+    thresholds: Thresholds,
+    own_s: float,
+    own: OneClock,
+    perhaps: OneClock | None = None,
 ) -> OneClock | None:
     """The clock by which a recording follows beside the ``others`` that foretell it, or None where it goes by theirs.
 
-    A lag about ``own_s``; a line about ``own`` where it is foretold far better still by that.
+    A lag about ``own_s``; a line about ``own`` where it is foretold far better still by that. ``perhaps`` as in
+    `is_better`.
     """
     foretold = run.made @ _weights(_products(others))
     found = None
     for about, parts in ((OneClock(own_s, 0.0), 1), (own, 2)):
         found = _later(run, foretold, thresholds, about, parts, found) or found
-    return found if found is not None and is_better(found, run, others) else None
+    if found is None or not is_better([*others, run.on(found)], [*others, run], perhaps):
+        return None
+    return found
 
 
-def is_better(clock: OneClock, run: Increments, others: Sequence[Increments]) -> bool:
-    """Whether one unit follows a recording and the ``others`` better if it goes by a clock of its own."""
-    return _left([*others, run.on(clock)]) < _left([*others, run])
+def is_better(moved: Sequence[Increments], alike: Sequence[Increments], perhaps: OneClock | None = None) -> bool:
+    """Whether one unit follows recordings better as some are ``moved`` by clocks of their own than all ``alike``.
+
+    Also than by one clock that all may go by, ``perhaps``: what that accounts for is none of their own.
+    """
+    return _left(moved) < min(unforetold(alike, clock) for clock in dict.fromkeys((None, perhaps)))
 
 
 def _of_first(runs: Mapping[int, Increments], lags: Sequence[Lags], thresholds: Thresholds) -> dict[int, float]:

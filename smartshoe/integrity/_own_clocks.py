@@ -104,11 +104,12 @@ def _of_fitted(
         apart = {place: lag_s for place, lag_s in apart.items() if not alone[place].lags.are_of(shared, thresholds)}
     moved = [run.earlier(apart.get(place) or alone[place].offset_s) for place, run in runs.items()]
     found = {place: OneClock(lag_s, 0.0) for place, lag_s in apart.items()}
-    if shared is None or found:
-        return _Reference(None, found, None, moved, None if found or own_s else perhaps)
-    is_likelier = bool(runs) and thresholds.clear * unforetold([*runs.values()], shared) < unforetold(moved)
-    clock = shared if is_likelier else None
-    return _Reference(shared, {}, clock, [run.on(clock) for run in moved], None if is_likelier or own_s else shared)
+    if found:
+        return _Reference(None, found, None, moved)
+    clock = None
+    if shared and runs and thresholds.clear * unforetold([*runs.values()], shared) < unforetold(moved):
+        clock = shared
+    return _Reference(shared, {}, clock, [run.on(clock) for run in moved], None if clock or own_s else perhaps)
 
 
 def _of_judging(
@@ -127,13 +128,10 @@ def _of_judging(
     seen = told
     if fitted.clock is not None and not alone.is_told:  # that none is told alone is told as well
         seen = clock_through([alone.lags]) or told
-    lag_s = float(seen.lag_s(middle_s) - theirs.lag_s(middle_s))
-    by = beside(run.on(fitted.clock), fitted.runs, thresholds, lag_s, _less(seen, theirs))
-    if by is not None and fitted.perhaps is not None:  # what all may do by one clock is none of its own
-        all_alike = unforetold([*fitted.runs, run], fitted.perhaps)
-        by = by if unforetold([*fitted.runs, run.on(by)]) < all_alike else None
+    lag_s, run = float(seen.lag_s(middle_s) - theirs.lag_s(middle_s)), run.on(fitted.clock)
+    by = beside(run, fitted.runs, thresholds, lag_s, _less(seen, theirs), fitted.perhaps)
     if by is None and alone.is_told:
-        return is_better(_less(told, theirs), run.on(fitted.clock), fitted.runs), None
+        return is_better([*fitted.runs, run.on(_less(told, theirs))], [*fitted.runs, run]), None
     return by is not None, by
 
 
