@@ -99,7 +99,7 @@ def examine(
     usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
     put_right = [_put_right(*one, decided) for one in zip(tamed, examined, usable, strict=True)]
     clocks = clocks_of([one for one, _ in put_right], usable, [one.alone for one in examined], count, decided)
-    for place, clock in clocks.found.items():
+    for place, clock in clocks.own.items():
         recording, findings = put_right[place]
         findings[:] = [one for one in findings if one.kind != "two_clocks"]
         findings.append(from_two_clocks(recording, clock, "than in the other recordings"))

@@ -354,12 +354,12 @@ def test_what_one_pair_of_clocks_accounts_for_is_no_lag_of_a_recordings_own(
         _seen([rate * at_s for at_s in moments], moments) for moments in ([20, 130, 270], [30, 250], [60, 110, 190])
     ]
     each[2] = replace(each[2], lag_s=each[2].lag_s + parts)
-    monkeypatch.setattr(_own_clocks, "apart_s", lambda *told: {2: parts or -0.0376})
+    monkeypatch.setattr(_own_clocks, "own_lags_s", lambda *told: {2: parts or -0.0376})
     runs = [_ramps(0.0, rate)] * 3
     found = _own_clocks.clocks_of(
         runs, [run.sensor.present for run in runs], [Alone(lags=one) for one in each], 3, STANDARD
     )
-    assert {place: by.before_s for place, by in found.found.items()} == own
+    assert {place: by.before_s for place, by in found.own.items()} == own
     assert (found.shared is None) is bool(own)
     if not own:
         assert found.shared == OneClock(pytest.approx(0.0, abs=0.03), pytest.approx(rate, rel=0.02))

@@ -15,10 +15,10 @@ from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import Aligned, aligned
 from smartshoe.integrity import Integrity, OneClock, examine
-from smartshoe.integrity._apart import apart_s, beside, increments_of, refined
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, from_two_clocks
 from smartshoe.integrity._examination import _view
 from smartshoe.integrity._own_clocks import Alone, Clocks, clocks_of
+from smartshoe.integrity._relative_lags import NO_LAG, increments_of, own_clock, own_lags_s, refined_clock
 from smartshoe.integrity._view import UNKNOWN_ENDS
 
 Array = NDArray[np.float64]
@@ -48,21 +48,20 @@ def _run(
     )
 
 
-def _apart(
+def _lags_s(
     *runs: Recording,
     lags: tuple[Lags, ...] | None = None,
-    own_s: dict[int, float] | None = None,
+    told_s: dict[int, float] | None = None,
     fitted: int | None = None,
-    perhaps: OneClock | None = None,
+    shared: OneClock | None = None,
 ) -> dict[int, float]:
     count = len(runs) if fitted is None else fitted
     compared = increments_of(runs, [one.sensor.present for one in runs], count, STANDARD)
-    foretelling = {place: run for place, run in compared.items() if place < count}
-    found = apart_s(foretelling, lags or (UNSEEN,) * len(runs), STANDARD, own_s or {}, perhaps)
+    fitted_ones = {place: run for place, run in compared.items() if place < count}
+    found = own_lags_s(fitted_ones, lags or (UNSEEN,) * len(runs), STANDARD, told_s or {}, shared)
     for place, run in compared.items():
-        if place >= count and foretelling:
-            nowhere = OneClock(0.0, 0.0)
-            by = beside(run, [*foretelling.values()], STANDARD, 0.0, nowhere)
+        if place >= count and fitted_ones:
+            by = own_clock(run, [*fitted_ones.values()], STANDARD, 0.0, NO_LAG)
             found |= {} if by is None else {place: by.before_s}
     return found
 
@@ -71,26 +70,26 @@ def _apart(
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_one_that_is_late_is_told_by_how_much(late_s: float, sign: float) -> None:
     runs = [_run(late_s if seed == 2 else 0.0, seed, sign=sign) for seed in range(4)]
-    assert _apart(*runs) == {2: pytest.approx(late_s, abs=0.01)}
+    assert _lags_s(*runs) == {2: pytest.approx(late_s, abs=0.01)}
 
 
 def test_two_that_are_late_are_told_each() -> None:
     runs = [_run(lag_s, seed) for seed, lag_s in enumerate((0.0, 0.12, 0.0, 0.0, -0.12, 0.0))]
-    assert _apart(*runs) == {1: pytest.approx(0.12, abs=0.03), 4: pytest.approx(-0.12, abs=0.03)}
+    assert _lags_s(*runs) == {1: pytest.approx(0.12, abs=0.03), 4: pytest.approx(-0.12, abs=0.03)}
 
 
 def test_of_two_recordings_it_is_the_one_with_the_longer_lag_of_its_own() -> None:
     runs = _run(0.1, 1), _run(0.0, 2)
     for lags, found in (((0.02, 0.01), {0: 0.1}), ((0.01, 0.02), {1: -0.1})):
         own = tuple(Lags(np.ones(1), np.array([one])) for one in lags)
-        assert _apart(*runs, lags=own) == {place: pytest.approx(lag, abs=0.01) for place, lag in found.items()}
+        assert _lags_s(*runs, lags=own) == {place: pytest.approx(lag, abs=0.01) for place, lag in found.items()}
 
 
 def test_what_all_recordings_share_and_what_a_logger_delays_is_of_no_clock() -> None:
-    assert _apart(_run(0.1, 1), _run(0.1, 2)) == {}
-    assert _apart(_run(0.0, 1), _run(0.03, 2)) == {}
-    assert _apart(_run(0.1, 1)) == {}
-    assert _apart(_run(0.0, 1), _run(0.1, 2).taken(slice(0, 50))) == {}
+    assert _lags_s(_run(0.1, 1), _run(0.1, 2)) == {}
+    assert _lags_s(_run(0.0, 1), _run(0.03, 2)) == {}
+    assert _lags_s(_run(0.1, 1)) == {}
+    assert _lags_s(_run(0.0, 1), _run(0.1, 2).taken(slice(0, 50))) == {}
 
 
 def _ends_softly(share: Array) -> Array:
@@ -118,20 +117,20 @@ def test_two_recordings_of_a_bent_unit_have_one_clock(curve: Callable[[Array], A
     ramps = _bent([0.0, 1.0, *(1.0 + np.cumsum(lasts_s))], [0.0, 0.0, *[1.0, 0.0] * 6], curve, "ramps")
     levels = np.repeat([0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0], 2)
     steps = _bent([0.0, 1.0, *(1.0 + np.cumsum([0.1, 2.0] * 8))], [0.0, 0.0, *levels], curve, "steps")
-    assert _apart(ramps, steps) == {}
+    assert _lags_s(ramps, steps) == {}
 
 
 def test_loads_of_a_few_percent_about_one_that_stands_tell_as_much() -> None:
     runs = [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
     small = [one.with_channel(one.load.with_values(800.0 + 0.02 * one.load.values)) for one in runs]
-    assert _apart(*small) == {1: pytest.approx(0.1, abs=0.01)}
+    assert _lags_s(*small) == {1: pytest.approx(0.1, abs=0.01)}
     still = [one.with_channel(one.load.with_values(np.full(len(one), 5.0))) for one in runs]
-    assert _apart(*still) == {}
+    assert _lags_s(*still) == {}
 
 
 def test_nor_is_a_lag_that_does_not_foretell_far_better() -> None:
     """Noise hides it."""
-    assert _apart(_run(0.0, 1, noise=20.0), _run(0.1, 2, noise=20.0)) == {}
+    assert _lags_s(_run(0.0, 1, noise=20.0), _run(0.1, 2, noise=20.0)) == {}
 
 
 def _late(recording: Recording, by_s: float) -> Recording:
@@ -143,10 +142,10 @@ def test_lags_of_one_pair_of_clocks_that_part_are_not_those_of_one_recording() -
     """The longer a recording, the later it is: moved by a lag of its own it is foretold no better than by the clock."""
     rate = 0.002
     runs = [_run(0.0, seed, rate=rate, cycles=cycles) for seed, cycles in enumerate((30, 6, 6, 6))]
-    assert _apart(*runs) == {0: pytest.approx(0.064, abs=0.01)}
-    assert _apart(*runs, perhaps=OneClock(0.0, rate)) == {}
+    assert _lags_s(*runs) == {0: pytest.approx(0.064, abs=0.01)}
+    assert _lags_s(*runs, shared=OneClock(0.0, rate)) == {}
     late = [_run(0.15 if seed == 2 else 0.0, seed) for seed in range(4)]
-    assert list(_apart(*late, perhaps=OneClock(0.0, rate))) == [2]
+    assert list(_lags_s(*late, shared=OneClock(0.0, rate))) == [2]
 
 
 @cache
@@ -194,7 +193,9 @@ def test_where_all_tell_lags_the_shortest_is_taken_as_told_and_the_others_lie_be
     found = examine([_run(lag_s, seed) for seed, lag_s in enumerate((1.2, 0.3, -0.7))], STANDARD)
     first, shortest, last = found.clock_offset_s
     assert (first - shortest, shortest, last - shortest) == pytest.approx((0.9, 0.3, -1.0), abs=0.1)
-    off = {k: lag for k, lag in _apart(*found.recordings, own_s=dict(enumerate((1.25, 0.3, -0.65)))).items() if k != 1}
+    off = {
+        k: lag for k, lag in _lags_s(*found.recordings, told_s=dict(enumerate((1.25, 0.3, -0.65)))).items() if k != 1
+    }
     assert off == {0: pytest.approx(1.2, abs=0.01), 2: pytest.approx(-0.7, abs=0.01)}
 
 
@@ -228,7 +229,7 @@ def test_what_is_held_out_does_not_tell_of_two_fitted_recordings_which_is_late()
     judging = [_run(lag_s, seed) for seed, lag_s in ((3, 0.1), (4, 0.1))]
     alone, found = examine(fitted, STANDARD), examine([*fitted, *judging], STANDARD, 2)
     assert found.clock_offset_s[:2] == alone.clock_offset_s
-    assert _apart(_run(0.0, 1), _run(0.1, 2), fitted=1) == {1: pytest.approx(0.1, abs=0.01)}
+    assert _lags_s(_run(0.0, 1), _run(0.1, 2), fitted=1) == {1: pytest.approx(0.1, abs=0.01)}
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.5])
@@ -245,7 +246,7 @@ def test_one_that_judges_and_drifts_by_itself_is_moved_by_what_it_tells(late_s: 
     assert (found.shared, found.others) == (OneClock(late_s, 0.0), frozenset([2]))
     if is_short:
         assert (found.offsets_s, found.rates) == ((late_s, late_s, middle_s + 0.02), (0.0, 0.0, 0.009))
-        assert found.found == {}
+        assert found.own == {}
     else:
         assert found.offsets_s == (late_s, late_s, pytest.approx(middle_s, abs=0.006))
         assert found.rates == (0.0, 0.0, pytest.approx(0.01, rel=0.02))
@@ -297,7 +298,7 @@ def test_one_that_judges_and_is_in_time_does_not_go_by_clocks_of_the_fitted_that
 def test_one_that_judges_and_parts_as_the_fitted_do_goes_by_their_clock(rate: float) -> None:
     runs = [_run(0.0, seed, rate=rate, cycles=60) for seed in range(3)]
     found = _clocks(runs, 2)
-    assert (found.others, found.found) == (frozenset(), {})
+    assert (found.others, found.own) == (frozenset(), {})
 
 
 @pytest.mark.parametrize("rate", [0.003, -0.0006])
@@ -308,7 +309,7 @@ def test_one_that_judges_and_parts_slowly_from_its_load_is_told_by_how_much(rate
     assert found.others == {2}
     assert found.rates == (0.0, 0.0, pytest.approx(rate, rel=0.03))
     assert found.offsets_s[2] == pytest.approx(0.5 * rate * runs[2].duration_s, abs=0.003)
-    assert "s at the end" in from_two_clocks(runs[2], found.found[2], "").says
+    assert "s at the end" in from_two_clocks(runs[2], found.own[2], "").says
 
 
 def test_a_rate_is_told_in_the_place_of_a_delay_only_where_one_unit_follows_far_better_by_it() -> None:
@@ -318,9 +319,9 @@ def test_a_rate_is_told_in_the_place_of_a_delay_only_where_one_unit_follows_far_
         seen = [Lags(at_s, 0.4 + 0.9 * rate * (at_s - 150.0))]
         compared = [*increments_of([run], [run.sensor.present], 1, STANDARD).values()]
         plain = OneClock(0.4, 0.0)
-        found = refined(plain, seen, compared, STANDARD)
+        found = refined_clock(plain, seen, compared, STANDARD)
         assert found == (OneClock(pytest.approx(-0.05, abs=0.02), pytest.approx(0.003, rel=0.02)) if rate else plain)
-        assert refined(plain, seen, [], STANDARD) == plain
+        assert refined_clock(plain, seen, [], STANDARD) == plain
 
 
 @pytest.mark.parametrize("knee", [0.06, 0.1])
@@ -353,10 +354,10 @@ def test_beside_a_day_a_few_seconds_tell_nothing_of_moments(lasts_s: float) -> N
     load = 400.0 * (1.0 - np.cos(2.0 * np.pi * time_s / 1800.0))
     day = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=0.1 * load, name="day")
     short = _run(0.1, 1).taken(slice(0, round(lasts_s / STEP_S)))
-    assert _apart(day, short) == {}
-    assert _apart(short, day) == {}
+    assert _lags_s(day, short) == {}
+    assert _lags_s(short, day) == {}
     # One that judges is asked by its beginning.
-    assert set(_apart(_run(0.0, 2), day, fitted=1)) <= {1}
+    assert set(_lags_s(_run(0.0, 2), day, fitted=1)) <= {1}
 
 
 def test_a_day_without_samples_in_a_recording_is_no_matter() -> None:
@@ -367,7 +368,7 @@ def test_a_day_without_samples_in_a_recording_is_no_matter() -> None:
         pressure_mbar=run.sensor.values,
         name="gap",
     )
-    assert _apart(gap, _run(0.0, 2), _run(0.0, 3)) == {}
+    assert _lags_s(gap, _run(0.0, 2), _run(0.0, 3)) == {}
 
 
 # -- large numbers ----------------------------------------------------------------------------------------------------
