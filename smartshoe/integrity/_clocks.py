@@ -1,12 +1,13 @@
 """Two clocks: a lag between load and reading that no relaxation, lag or friction of the unit explains.
 
-Increments of load and reading over equal bins are correlated window by window; a window's lag is the smallest one
-that correlates as well as the best. A unit with friction stands still after each reversal, which makes a plateau of
-lags from zero on, and a unit with relaxation answers a corner at once: both give zero. The lags are then a straight
-line over time (an offset and a rate). Last, the line must *earn* its place: load passed through a bank of relaxations,
-powers and stop operators must fit the reading much better on the shifted clock than on the given one, as the load rises
-and as it falls; and the reading must not answer what its load does anew before that lag is over, as one that is slow by
-itself does, whatever its equation.
+1. Increments of load and reading over equal bins are correlated window by window. A window's lag is the smallest one
+   that correlates about as well as the best. A unit with friction stands still after each reversal, so all lags from
+   zero on correlate alike; a unit that relaxes answers a corner of the load at once. Both give zero.
+2. A straight line (an offset and a rate) is laid through the windows' lags.
+3. The line must *earn* its place. Powers of the load, the load behind a bank of first-order lags and play operators are
+   fitted to the reading; they must fit it far better on the shifted clock than on the given one, both as the load rises
+   and as it falls.
+4. The reading must not answer changes of the load before that lag is over, as a slow unit does, whatever its equation.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._answers import answered_s, binned
 from smartshoe.integrity._fault import Finding, OneClock
-from smartshoe.integrity._following import of_share
+from smartshoe.integrity._following import share_regressors
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -30,14 +31,14 @@ from smartshoe.recording import Recording
 # Resolutions: half and twice of each changed no finding in two cases.
 SMOOTHING = (1.0, 3.0, 6.0)  # echoes
 WINDOWS = 8  # at most: octants of the load's movement
-OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # what a bank of plays spans about the share that stands still
+OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # widths of the play operators, in shares that count as standing still
 
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """By how much the reading follows best, of a clock or of the unit, about some moments of a recording.
+    """The lags ``lag_s`` (w,) by which the reading follows its load, at times ``at_s`` (w,) from a recording's start.
 
-    ``lag_s`` (w,) at ``at_s`` (w,) from its beginning; none where nothing tells.
+    They may be of a clock or of the unit itself. Empty where the recording tells none.
     """
 
     at_s: Array
@@ -49,12 +50,12 @@ class Lags:
         return float(np.median(self.lag_s))
 
     def off_from_s(self, clock: OneClock) -> float:
-        """By how much they are off from a clock's, their median; infinite where nothing tells."""
+        """The median of their distances from a clock's lags; infinite where there are none."""
         off = np.abs(self.lag_s - clock.lag_s(self.at_s))
         return float(np.median(off)) if off.size else np.inf
 
     def are_of(self, clock: OneClock, thresholds: Thresholds) -> bool:
-        """Whether they lie on a clock's, but for a share of its longest."""
+        """Whether they lie on a clock's line, within a share of its longest lag; false where there are none."""
         return bool(self.at_s.size) and _describes(clock.lag_s(self.at_s), self.lag_s, thresholds)
 
 
@@ -62,28 +63,28 @@ UNSEEN = Lags(np.zeros(0), np.zeros(0))
 
 
 def align(view: View) -> tuple[View, Lags]:
-    """The view with its load on the reading's clock, where the clocks differ; else as it was, with all it has found.
+    """The view with its load set on the reading's clock, where the clocks differ, and the lags that were seen.
 
-    And the lags that were seen. A reading that is late by a quarter or half of a period seems to fall as the load
-    rises: it is turned over where it follows the load only so, or far more closely so. Of loads that rise as they fall
-    both ways are as close, and it is left as it is.
+    A reading that is late by a quarter or half of a period seems to fall as the load rises. It is turned over where it
+    follows the load only when turned over, or far more closely. Where the load rises as it falls both are as close,
+    and the reading is left as it is.
     """
-    followed = _followed(view)
-    is_open = not _follows(followed, view.thresholds)
+    followed = _window_lags(view)
+    is_open = not _correlates(followed, view.thresholds)
     if view.sign < 0 or is_open:
         turned = view.turned()
-        over = _followed(turned)
-        far = view.thresholds.clear * (1.0 - _closeness(over)) < 1.0 - _closeness(followed)
+        over = _window_lags(turned)
+        far = view.thresholds.clear * (1.0 - _correlation_of(over)) < 1.0 - _correlation_of(followed)
         if far and over is not None and followed is not None and over.smooth_s > followed.smooth_s:
-            # Smoothed by much, any presses are sines, which follow one another either way.
-            alike = _followed(view, (over.smooth_s / view.thresholds.echo_s,))
-            far = view.thresholds.clear * (1.0 - _closeness(over)) < 1.0 - _closeness(alike)
-        if _follows(over, view.thresholds) and (is_open or far):
+            # Strong smoothing makes sines of any presses, and sines follow one another either way.
+            alike = _window_lags(view, (over.smooth_s / view.thresholds.echo_s,))
+            far = view.thresholds.clear * (1.0 - _correlation_of(over)) < 1.0 - _correlation_of(alike)
+        if _correlates(over, view.thresholds) and (is_open or far):
             view, followed = turned, over
     if followed is None:
         return view, UNSEEN
     seen = Lags(followed.places - view.time_s[0], followed.best)
-    line = _lag_line(view, followed) if _follows(followed, view.thresholds) else None
+    line = _lag_line(view, followed) if _correlates(followed, view.thresholds) else None
     if line is None:
         return view, seen
     offset_s, rate = line
@@ -94,7 +95,7 @@ def align(view: View) -> tuple[View, Lags]:
 
 
 def clock_through(each: Sequence[Lags], rate: float | None = None) -> OneClock | None:
-    """One line through lags, in whichever recording (Theil 1950, Sen 1968), or of a ``rate``; None of no lags."""
+    """One line through the lags of all recordings (Theil 1950, Sen 1968), of a given ``rate`` if any; None of none."""
     there = [one for one in each if one.at_s.size]
     if not there:
         return None
@@ -104,10 +105,10 @@ def clock_through(each: Sequence[Lags], rate: float | None = None) -> OneClock |
 
 
 def one_clock(each: Sequence[Lags], thresholds: Thresholds) -> OneClock | None:
-    """The one pair of clocks that accounts for all lags that are seen, a recording each; one delay, where that does.
+    """The one clock that accounts for the lags of all recordings: a constant delay if that does, else a line, or None.
 
-    Slow or few movements tell no clock alone, and what is told alone differs by chance. One line through the lags of
-    all recordings must leave none of them off by more than a share of the longest lag, nor most of the moments in any.
+    A recording with few or slow movements tells no clock alone, and those that do differ by chance. The distances of
+    most lags from the clock, and the spread of the recordings' medians, must be within a share of the longest lag.
     """
     through, there = clock_through(each), [one for one in each if one.at_s.size]
     if through is None:
@@ -124,7 +125,7 @@ def one_clock(each: Sequence[Lags], thresholds: Thresholds) -> OneClock | None:
 
 
 def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``two_clocks``: every sample is late or early; nothing is masked."""
+    """Kind ``two_clocks``: all samples are late or early; none is masked."""
     if view.offset_s == 0.0 and view.rate == 0.0:
         return
     clock = OneClock(view.offset_s - 0.5 * view.rate * view.recording.duration_s, view.rate)
@@ -132,9 +133,9 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
 
 
 def from_two_clocks(recording: Recording, clock: OneClock, more: str, least_s: float = 0.0) -> Finding:
-    """The finding of a reading that is late by a ``clock``, ``more`` than something.
+    """The finding of a reading that lags by ``clock``; ``more`` says than what.
 
-    From when to when is said where it grows by more than ``least_s``.
+    The lag at the start and at the end is said where they differ by more than ``least_s``.
     """
     first_s, middle_s, last_s = clock.lag_s(np.array([0.0, 0.5, 1.0]) * recording.duration_s)
     is_drift = abs(last_s - first_s) > least_s
@@ -149,16 +150,17 @@ def from_two_clocks(recording: Recording, clock: OneClock, more: str, least_s: f
 
 
 def _least_lag_s(view: View) -> float:
-    """Less may be the sensor's own lag, or the delay of a logger, which a model holds."""
+    """The shortest lag that counts: a shorter one may be the sensor's own or a logger's delay, which a model has."""
     return max(view.thresholds.sensor_lag_s, view.thresholds.few * view.step_s)
 
 
 @dataclass(frozen=True, eq=False)
-class _Followed:
-    """Load and reading over even bins at ``grid`` (b,) and how late the reading follows in each of some windows.
+class _WindowLags:
+    """Load and reading over even bins at ``grid`` (b,), and the lag of the reading in each of w windows.
 
-    ``movements``: how often the load begins to rise, or to fall. ``places`` (w,) are the windows' middles in s,
-    ``smallest`` and ``best`` lags in s, ``weights`` correlations.
+    ``movements``: how often the load begins to rise or to fall. ``places`` (w,): the windows' middles in s. ``best``
+    (w,): the lags in s that correlate best, ``weights`` (w,) these correlations; ``smallest`` (w,): zero where zero
+    correlates about as well, else ``best``.
     """
 
     grid: Array
@@ -172,8 +174,8 @@ class _Followed:
     weights: Array
 
 
-def _followed(view: View, smoothing: Sequence[float] = SMOOTHING) -> _Followed | None:
-    """How late the reading follows, or None where nothing can tell; ``smoothing`` in echoes, the least that does."""
+def _window_lags(view: View, smoothing: Sequence[float] = SMOOTHING) -> _WindowLags | None:
+    """How late the reading follows, or None where that cannot be told; ``smoothing``: widths to try, in ``echo_s``."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
     if duration_s < given.hold_s:
@@ -185,29 +187,29 @@ def _followed(view: View, smoothing: Sequence[float] = SMOOTHING) -> _Followed |
     reading = binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
-    for echoes in smoothing:  # as little as the noise allows, since smoothing blunts the edges
+    for echoes in smoothing:  # the narrowest that the noise allows, since smoothing blunts the edges
         found = _by_windows(grid, load, reading, width_s, echoes * given.echo_s, given)
-        if _follows(found, given):
+        if _correlates(found, given):
             break
     return found
 
 
-def _closeness(of: _Followed | None) -> float:
-    """How nearly the reading's edges are the load's, as a correlation."""
+def _correlation_of(of: _WindowLags | None) -> float:
+    """The windows' median correlation of the reading's increments with the load's; -1 of none."""
     return -1.0 if of is None else float(np.median(of.weights))
 
 
-def _follows(of: _Followed | None, thresholds: Thresholds) -> bool:
-    """Whether the reading's edges are the load's."""
-    return _closeness(of) >= 1.0 - thresholds.same
+def _correlates(of: _WindowLags | None, thresholds: Thresholds) -> bool:
+    """Whether the reading's increments correlate well with the load's."""
+    return _correlation_of(of) >= 1.0 - thresholds.same
 
 
-def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
-    """Lag in s in the middle and its growth in s per s, or None where the clocks agree."""
+def _lag_line(view: View, of: _WindowLags) -> tuple[float, float] | None:
+    """The lag in the middle of the recording in s and its rate in s per s, or None where the clocks agree."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
     grid, places = of.grid, of.places
-    if of.movements < given.few:  # of one or two a curve's rise is late, and its fall early, too
+    if of.movements < given.few:  # a curve, too, makes the rise late and the fall early
         return None
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
@@ -227,11 +229,11 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
             before = _unexplained(*as_logged, known)
             after = _unexplained(*_increments(of, np.interp(followed_s, grid, of.load), given), known)
             agreed = lags is of.smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
-            # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
-            # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
-            # a constant lag from a relaxation neither way.
+            # A unit that relaxes answers later the farther it is pressed: a growing lag without any clock. Where it
+            # relaxes by half it is seconds late, and the shifted clock explains it far worse. Blunt edges tell a
+            # constant lag and a relaxation apart in neither way.
             agrees = agreed and after.sum() < before.sum() / (1.0 if rate else 1.0 - given.same)
-            # At rising and at falling edges alike: load that the unit remembers has a lag for each direction.
+            # At rising and at falling edges alike: what a unit remembers of its load has another lag each way.
             is_earned = agrees or np.all(after <= earned * before)
             if is_earned and not _is_answered_before(view, ends, given):
                 offered.append((float(after.sum()), offset_s, rate))
@@ -241,14 +243,14 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
 
 
 def _is_one_sine(load: Array, thresholds: Thresholds) -> bool:
-    """Whether the load is little more than one sine: its lag is a phase, which any relaxation has."""
+    """Whether the load is hardly more than one sine: a lag is then a phase shift, which any relaxation makes."""
     power = np.abs(np.fft.rfft(np.diff(load))) ** 2
     best = int(np.argmax(power))
     return bool(power[max(best - 2, 0) : best + 3].sum() > (1.0 - thresholds.faulty_share) * power.sum())
 
 
 def _repeats_itself(load: Array, thresholds: Thresholds) -> bool:
-    """Whether the load is periodic: windows then agree on a lag that may be wrong by a period."""
+    """Whether the load is periodic: all windows may then agree on a lag that is wrong by a period."""
     from scipy.signal import correlate
 
     d = np.diff(load)
@@ -259,10 +261,10 @@ def _repeats_itself(load: Array, thresholds: Thresholds) -> bool:
 
 
 def _unanimous(places: Array, lags: Array, offset_s: float, rate: float, thresholds: Thresholds) -> bool:
-    """Whether windows agree on a lag too long for a sensor's own: then edges need not be sharp enough to tell the two.
+    """Whether the windows agree on a lag that is too long for a sensor: edges then need not be sharp enough to tell.
 
-    Counted are the windows in which the line itself is clearly longer than a sensor's lag (a unit that relaxes answers
-    a corner at once); hardly any of them may allow zero.
+    Counted are the windows in which the line is clearly longer than a sensor's lag. Hardly any of them may allow a lag
+    of zero, as those of a unit that relaxes do.
     """
     line = offset_s + rate * places
     far = np.abs(line) > thresholds.clear * thresholds.sensor_lag_s
@@ -270,9 +272,9 @@ def _unanimous(places: Array, lags: Array, offset_s: float, rate: float, thresho
 
 
 def _is_answered_before(view: View, ends_s: Array, thresholds: Thresholds) -> bool:
-    """Whether the reading answers its load in less than half of what a line is late at its ends: the unit is slow.
+    """Whether the reading answers its load within half of the line's lag (``ends_s``, (2,), at its ends).
 
-    Of two clocks nothing is answered before the lag is over.
+    Then the unit is slow: with two clocks nothing is answered before the lag is over.
     """
     if ends_s[0] * ends_s[1] <= 0.0:
         return False
@@ -283,14 +285,14 @@ def _is_answered_before(view: View, ends_s: Array, thresholds: Thresholds) -> bo
 
 
 def _describes(line: Array, lags: Array, thresholds: Thresholds) -> bool:
-    """Whether lags (w,) lie on a ``line`` (w,), but for a share of its longest."""
+    """Whether ``lags`` (w,) lie on a ``line`` (w,), within a share of its longest lag."""
     return bool(np.median(np.abs(lags - line)) < thresholds.same * np.max(np.abs(line)))
 
 
 def _by_windows(
     grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float, thresholds: Thresholds
-) -> _Followed | None:
-    """How late the reading follows in each window in which it and the load both move; None where there is none."""
+) -> _WindowLags | None:
+    """How late the reading follows in each window in which both it and the load move; None where there is none."""
     from scipy.ndimage import gaussian_filter1d
 
     smooth = max(smooth_s / width_s, 1.0)
@@ -315,13 +317,13 @@ def _by_windows(
             continue
         closeness, against = float(correlation[best]), -float(correlation[-1 - best])
         is_opposed = thresholds.clear * against > closeness
-        # As much against it as for it, on both sides of zero: one is the other's rate, as in friction. Of even steps so
-        # is a delay, which the reading follows far more closely.
+        # A correlation as strong and negative at the opposite lag: one signal is the other's rate, as in friction. A
+        # delay does the same in even steps, but the reading then follows far more closely.
         if closeness < thresholds.follows or (is_opposed and thresholds.clear * (1.0 - closeness) > 1.0 - against):
             continue
         good = np.flatnonzero(correlation >= (1.0 - thresholds.standing) * correlation[best])
         chosen = int(good[np.argmin(np.abs(lags_bins[good]))])
-        # Where zero is not as good as the best there is no plateau from zero on: the peak itself is the lag.
+        # Where zero does not correlate about as well as the best, the lag is that of the peak.
         peak = (float(lags_bins[best]) + _beside_its_sample(correlation, best)) * width_s
         power = d_load[low:high] ** 2
         places.append(float(np.dot(power, grid[low:high]) / power.sum()))
@@ -331,20 +333,20 @@ def _by_windows(
     if not places:
         return None
     each = (np.array(one) for one in (places, smallest, peaks, weights))
-    return _Followed(grid, load, reading, smooth_s, _movements(d_load, moving), *each)
+    return _WindowLags(grid, load, reading, smooth_s, _movements(d_load, moving), *each)
 
 
 def _movements(increments: Array, moving: Mask) -> int:
-    """How often a load of these increments (b,) begins to rise, or to fall, where it is ``moving`` (b,)."""
+    """How often a load with these ``increments`` (b,) begins to rise or to fall, where it is ``moving`` (b,)."""
     way = np.where(moving, np.sign(increments), 0.0)
     return int(np.count_nonzero((way != 0.0) & (np.diff(way, prepend=0.0) != 0.0)))
 
 
 def _without_jumps(increments: Array, moving: Mask, thresholds: Thresholds) -> Array:
-    """(b,) a reading's increments, cut short where they are those of dropouts and jumps.
+    """(b,) a reading's increments, those of dropouts and jumps clipped to what moves usually reach.
 
-    Usual is the median of as many of the largest as there are increments in which the load is ``moving`` (b,): when the
-    reading moves, other than how often, is not known before the clocks are.
+    The usual size is the median of the largest ones, as many as there are bins in which the load is ``moving`` (b,):
+    when the reading moves is not known before the clocks are, but how often is.
     """
     usual = float(np.quantile(np.abs(increments), 1.0 - 0.5 * float(moving.mean())))
     limit = largest_of_noise(increments.size, thresholds) * usual + 1e-300
@@ -352,10 +354,10 @@ def _without_jumps(increments: Array, moving: Mask, thresholds: Thresholds) -> A
 
 
 def _correlation(load: Array, reading: Array, most: int, thresholds: Thresholds) -> Array:
-    """(2 most + 1,) correlation at lags -most..most bins, each of what overlaps at it.
+    """(2 most + 1,) correlation at lags -most..most bins, normalised by what overlaps at each lag.
 
-    Held against all that moves in the window, a longer lag would seem worse than one shorter by a step of a walk. Where
-    less than half of what moves overlaps, it tells as little as that half would.
+    Normalised by the whole window, a long lag would seem worse than one that is shorter by a step of a walk. Where less
+    than half of the movement overlaps, the norm of half of it is taken.
     """
     from scipy.signal import correlate
 
@@ -379,11 +381,11 @@ def _correlation(load: Array, reading: Array, most: int, thresholds: Thresholds)
 
 
 def _peak(correlation: Array, thresholds: Thresholds) -> int | None:
-    """The place, among lags about zero, at which a reading follows; None where it does beyond the longest of them.
+    """The index of the correlation's peak, or None where the reading follows beyond the longest lag.
 
-    Of an even load each period is a peak: the nearest to zero that no other exceeds far. By as little as the square of
-    what counts as standing still none does: a gain that drifts makes of two periods the later one the closer. Nor does
-    what is at the longest lag by what counts as standing still: a period may be as long.
+    A periodic load has a peak a period: the one nearest to zero is taken whose distance from 1 is within a factor
+    ``clear`` of the best one's. That best distance is taken as ``standing`` squared at least, since a gain that drifts
+    makes a later period the closer one; and as ``standing`` where the best is at the longest lag, as a period may be.
     """
     inner = correlation[1:-1]
     is_peak = (inner >= correlation[:-2]) & (inner >= correlation[2:])
@@ -394,17 +396,17 @@ def _peak(correlation: Array, thresholds: Thresholds) -> int | None:
 
 
 def _beside_its_sample(values: Array, best: int) -> float:
-    """Where the peak of ``values`` (n,) lies beside its sample within, in samples: that of a parabola through three."""
+    """How far the peak of ``values`` (n,) lies from its sample ``best``, in samples, by a parabola through three."""
     before, at, after = values[best - 1 : best + 2]
     bend = before - 2.0 * at + after
     return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tuple[float, float]]:
-    """Offset and rate to try; ``places`` from the middle, ``half_s`` before which both clocks may have been set.
+    """Lines to try, as (lag in the middle in s, rate); ``places`` (w,) from the middle, which is ``half_s`` long after.
 
-    With four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), where it halves the scatter; then
-    what grows from nothing, and the constant.
+    With four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), if it halves the scatter; then a
+    line from zero at the start, where both clocks may have been set; then a constant.
     """
     found = []
     if places.size >= 4:
@@ -417,7 +419,7 @@ def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tu
 
 
 def _slope(places: Array, lags: Array) -> float:
-    """The median slope of all pairs that are not close together, 0 of a single place."""
+    """The median slope over all pairs of places that are not close together; 0 of a single place."""
     i, j = np.triu_indices(places.size, 1)
     apart = np.abs(places[j] - places[i]) > np.ptp(places) / places.size
     return float(np.median((lags[j] - lags[i])[apart] / (places[j] - places[i])[apart])) if apart.any() else 0.0
@@ -429,37 +431,39 @@ def _middle(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(np.cumsum(weights[order]) / weights.sum(), 0.5)])
 
 
-def _increments(of: _Followed, load: Array, thresholds: Thresholds) -> tuple[Array, Array]:
-    """(b, k) increments of what a unit may make of a ``load`` (b,), its own the first; (b,) those of the reading.
+def _increments(of: _WindowLags, load: Array, thresholds: Thresholds) -> tuple[Array, Array]:
+    """Increments (b, k) of what a unit may make of a ``load`` (b,), the load's own first, and (b,) of the reading.
 
-    Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
+    Increments, since edges tell of clocks and the static curve does not. Jumps of the reading are clipped.
     """
     from scipy.ndimage import gaussian_filter1d
 
     step_s = float(of.grid[1] - of.grid[0])
     smooth = max(of.smooth_s / step_s, 1.0)
-    made = made_of((load - load.min()) / np.ptp(load), step_s, smooth, thresholds)
+    made = regressors_of((load - load.min()) / np.ptp(load), step_s, smooth, thresholds)
     read = gaussian_filter1d(of.reading, smooth, order=1)
     moving = np.abs(made[:, 0]) > thresholds.faulty_share * np.max(np.abs(made[:, 0]))
     return made, _without_jumps(read, moving, thresholds)
 
 
-def made_of(share: Array, step_s: float, smooth: float, thresholds: Thresholds) -> Array:
-    """(b, k) increments of what a unit may make of a ``share`` (b,) of its load, over some bins, its own the first."""
+def regressors_of(share: Array, step_s: float, smooth: float, thresholds: Thresholds) -> Array:
+    """Increments (b, k), smoothed over ``smooth`` bins, of what a unit may make of a load of ``share`` (b,).
+
+    First its own, then its square and cube, first-order lags of it, and play operators.
+    """
     from scipy.ndimage import gaussian_filter1d
 
     shortest_s, longest_s = thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1]
-    viscous = of_share(share, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
+    viscous = share_regressors(share, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
     rubbed = _play(share, thresholds.standing * OCTAVES)
     return np.asarray(gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1))
 
 
 @on_one_thread
 def _unexplained(made: Array, read: Array, known: Mask) -> Array:
-    """(2,) sums over rising and over falling load: squares of what is ``read`` (b,) and not ``made`` (b, k) of it.
+    """(2,) residual sums of squares over rising and over falling load, of `_increments` by least squares.
 
-    Of `_increments`. Only where the load is ``known`` (b,): what a reading follows may lie before the recording, or
-    after it.
+    Only where the shifted load is ``known`` (b,): what a reading follows may lie before or after the recording.
     """
     matrix, target = made[known], read[known]
     matrix /= np.linalg.norm(matrix, axis=0) + 1e-300
@@ -471,7 +475,7 @@ def _unexplained(made: Array, read: Array, known: Mask) -> Array:
 
 
 def _play(load: Array, width: Array) -> Array:
-    """(n, widths) play operators of the load, each of one width."""
+    """(n, widths) play operators of the load, one a width."""
     from smartshoe.kernels.memory import NO_LOAD, backlash
 
     out = np.empty((width.size, load.size))

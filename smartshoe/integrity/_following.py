@@ -136,7 +136,9 @@ def _followed_share(view: View) -> tuple[float, float]:
     load = view.load.values[: count * width].reshape(count, width).mean(axis=1)
     reading = np.median(view.reading.values[: count * width].reshape(count, width), axis=1)
     curve = np.interp(load, view.curve[0], view.curve[1])
-    columns = np.concatenate([of_load(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1)
+    columns = np.concatenate(
+        [load_regressors(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1
+    )
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
     if _comes_once(load, view.thresholds):
         base = base[:, :1]
@@ -175,12 +177,12 @@ def _moves_with(load: Array, reading: Array, stride: float, thresholds: Threshol
     return float(np.dot(d_load, d_reading) / size - thresholds.clear / np.sqrt(load.size / apart))
 
 
-def of_load(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
+def load_regressors(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
     """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
-    return of_share((load - load.min()) / np.ptp(load), step_s, time_constants_s)
+    return share_regressors((load - load.min()) / np.ptp(load), step_s, time_constants_s)
 
 
-def of_share(f: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
+def share_regressors(f: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
     """(n, 3 + k) a share ``f`` (n,) of a load, its square and cube, and the share behind k first-order lags."""
     lags = [lagged(f, step_s, float(tau_s)) for tau_s in time_constants_s]
     return np.stack([f, f**2, f**3, *lags], axis=1)

@@ -15,7 +15,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._answers import binned
-from smartshoe.integrity._clocks import Lags, clock_through, made_of
+from smartshoe.integrity._clocks import Lags, clock_through, regressors_of
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity.thresholds import Thresholds
@@ -244,7 +244,7 @@ def _increments(
         for one in (recording.force_n, recording.sensor.si)
     )
     smooth = max(thresholds.echo_s / step_s, 1.0)
-    regressors = made_of((load - ends_n[0]) / (ends_n[1] - ends_n[0]), step_s, smooth, thresholds)
+    regressors = regressors_of((load - ends_n[0]) / (ends_n[1] - ends_n[0]), step_s, smooth, thresholds)
     response, min_lag_s = gaussian_filter1d(reading, smooth, order=1), thresholds.few * recording.sample_time_s
     return Increments(grid, regressors, response, float(recording.time_s[0]), min_lag_s)
 
