@@ -3,7 +3,7 @@
 ``python tests/mutation/run_mutants.py units journal --count 30 --seed 1 --keep out/mutants.jsonl`` draws thirty mutants
 a room; without a room's name it takes all of ``rooms.toml``. The same seed on the same source draws the same ones. What
 the kept file holds is not run again; with ``--survivors`` those that survived are. ``--listed`` runs the bugs of
-``listed.toml`` instead. A mutant whose name stands in docs/reliability.md is argued for there and counts as neither.
+``listed.toml`` instead. A mutant whose name stands in ``equivalent.md`` cannot matter, and counts as neither.
 
 Each is put into a copy of the checkout, so that programs that tests start meet it too. Which lines each test runs is
 found once (the kept file holds that as well); of the room's tests those are run that run the mutant's lines, cheapest
@@ -37,7 +37,7 @@ from mutants import changed, changes
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 COPIED = ("smartshoe", "simulators", "tests", "scenarios", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
-ARGUED = ROOT / "docs" / "reliability.md"
+EQUIVALENT = HERE / "equivalent.md"
 KERNELS = "smartshoe/kernels/"
 Result = dict[str, Any]
 
@@ -58,7 +58,7 @@ class Mutant:
 
     @property
     def name(self) -> str:
-        """What it is called in the kept file and in docs/reliability.md."""
+        """What it is called in the kept file and in ``equivalent.md``."""
         return f"{self.file.removeprefix('smartshoe/')}: {self.shown}"
 
     @property
@@ -232,16 +232,16 @@ def copied() -> Iterator[Path]:
         yield copy
 
 
-def told(results: list[Result], argued: str) -> str:
+def told(results: list[Result], equivalent: str) -> str:
     """A line a room, and the survivors."""
     lines = []
     for room in dict.fromkeys(result["room"] for result in results):
         own = [result for result in results if result["room"] == room]
         alive = [result for result in own if result["outcome"] not in ("killed", "hung")]
-        open_ = [result for result in alive if result["name"] not in argued]
+        open_ = [result for result in alive if result["name"] not in equivalent]
         counted, killed = len(own) - len(alive) + len(open_), len(own) - len(alive)
         share = 100.0 * killed / max(counted, 1)
-        lines.append(f"{room}: {killed} of {counted} killed ({share:.0f} %), {len(alive) - len(open_)} argued for")
+        lines.append(f"{room}: {killed} of {counted} killed ({share:.0f} %), {len(alive) - len(open_)} equivalent")
         lines += [f"    line {result['line']}: {result['name']}" for result in open_]
     return "\n".join(lines)
 
@@ -284,7 +284,7 @@ def main() -> None:
                 if own:
                     Room(copy, kept, table[room], plain_python, options.most).try_each(own)
             results += [kept.results[mutant.name] for mutant in mutants]
-    print(told(results, ARGUED.read_text(encoding="utf-8")))
+    print(told(results, EQUIVALENT.read_text(encoding="utf-8")))
 
 
 if __name__ == "__main__":
