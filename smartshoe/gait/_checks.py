@@ -1,4 +1,4 @@
-"""What a trial's numbers should not be trusted for, a sentence each."""
+"""Flags that say which numbers of a trial should not be trusted, and why, in a sentence each."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from smartshoe.gait._force_sums import Forces
 
 
-LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # what a person may weigh
+LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # range of body weights
 WEIGHT_OFF = 0.05
-SILENT = 0.02  # of the foot's peak
+SILENT = 0.02  # of the foot's peak: a unit that never reads more bears nothing
 FAST = 1.1  # times the calibrated loading rate
 FAST_QUANTILE = 0.995
 LEAST_DRIFT_S = 10.0
-STANDING_DRIFT = 0.02  # of the total, from the first fifth of a standing to its last
+STANDING_DRIFT = 0.02  # of the mean total: largest change from the first fifth of a standing spell to its last
 
 
 def window_flags(
@@ -38,7 +38,7 @@ def window_flags(
     loaded: Mapping[str, bool],
     total: TotalForce | None,
 ) -> list[Flag]:
-    """What a window shows, those about whole shoes first."""
+    """The flags that one window gives rise to; those about whole shoes come first."""
     flags: list[Flag] = []
     if len(feet) == 1:
         flags += _one_shoe(next(iter(feet)))
@@ -65,7 +65,7 @@ def window_flags(
 
 
 def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: int, runs: int) -> list[Flag]:
-    """What only the whole trial shows: a body weight that cannot be, and strides of two kinds."""
+    """The flags that need the whole trial: an implausible body weight, and strides of both walking and running."""
     flags = _weight(forces, coverage, given_n)
     if walks and runs:
         main = "running" if runs > walks else "walking"
@@ -79,7 +79,7 @@ def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: i
 
 
 def plain_percent(mask: Mask) -> str:
-    """The share of True, in percent with two digits."""
+    """The share of True values, in percent with two digits, as text."""
     share = 100.0 * float(mask.mean())
     return f"{share:.0f}" if share >= 10 else f"{share:.2g}"
 
@@ -226,7 +226,7 @@ def _gaps(foot: Foot, series: FootSeries) -> list[Flag]:
 
 
 def _standing_drift(total: TotalForce, spans: Sequence[tuple[float, float]]) -> list[Flag]:
-    """Said where the total of standing runs away: a body that stands weighs the same at its end as at its begin."""
+    """A flag if the total force drifts while the person stands, for a standing body's weight does not change."""
     time_s, total_n = total.time_s, total.force_n
     for start_s, end_s in spans:
         first, last = np.searchsorted(time_s, [start_s + SETTLED_S, end_s - SETTLED_S])
