@@ -87,9 +87,9 @@ def _is_in_order(series: FootSeries, strides: Sequence[Stride]) -> bool:
 
 
 def _exchanged_sides(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> str | None:
-    """The region whose left and right columns, exchanged back, would let both feet swing; None where none would.
+    """The region whose left and right columns, exchanged back, would let both feet swing; None if there is none.
 
-    A foot that carries a column of the other one is loaded while it should swing.
+    A foot with one column of the other foot is loaded while it should swing.
     """
     if len(feet) < 2 or feet["left"].regions != feet["right"].regions:
         return None

@@ -1,4 +1,4 @@
-"""Who may ask: hosts by name, pages of our own, and whoever has the token."""
+"""`Guard`: decides which requests the live server accepts, by host name, origin and token."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 
 class Guard:
-    """Refuses, before anything else sees it, a request of another page, under another name or without the token.
+    """ASGI middleware that refuses requests from another page, under another host name or without the token.
 
-    ``port`` is ours. Without a ``token`` only the loopback's names are taken as Host, so that no page of elsewhere can
-    point a name of its own at us. An Origin must be the address that the request was sent to; programs send none.
+    ``port`` is the server's own. Without a ``token``, only the loopback's names are accepted as Host, so that no
+    foreign page can point a name of its own at this server. An Origin must equal the address that the request was sent
+    to; programs send none.
     """
 
     def __init__(self, app: App, port: int, token: str | None) -> None:

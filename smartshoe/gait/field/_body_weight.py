@@ -103,7 +103,7 @@ def check_body_weight(
 def _whole_strides(
     feet: Mapping[str, Array], total: Array, rate_hz: float, body_weight_n: float
 ) -> tuple[slice, Array | None, str]:
-    """The longest chain of strides of the foot that has most: its span, the mean total (strides,) of each."""
+    """The longest chain of strides of one foot: its span, the mean total (strides,) of each, and a text for it."""
     best: list[int] = []
     for foot in feet.values():
         chain: list[int] = []

@@ -19,7 +19,7 @@ FROM, TO = 0.4, 0.8  # of a swing: by then the shoe is unloaded, and the heel is
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """Samples ``start`` up to ``stop`` below the threshold, ``middle`` of them surely off the ground."""
+    """A swing: samples ``start`` up to ``stop`` are below the threshold; in ``middle`` the foot is in the air."""
 
     start: int
     stop: int
