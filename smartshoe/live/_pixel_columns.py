@@ -11,7 +11,7 @@ from smartshoe.arrays import Array, Integers
 
 @dataclass(frozen=True, eq=False)
 class PixelColumns:
-    """A signal in columns of pixels: ``place`` (n,) are their numbers; times the columns' width that is their time.
+    """A signal in columns of pixels; ``place`` (n,) are the columns' numbers, that is, times divided by the width.
 
     ``low`` and ``high`` (n, width) are the extreme values of the samples in each column, NaN where all are missing.
     Columns without samples are left out.

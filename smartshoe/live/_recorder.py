@@ -155,7 +155,7 @@ class LiveRecording:
         self._put((-1, json.dumps(note, allow_nan=False).encode(), 0))
 
     def close(self) -> None:
-        """Write what waits, end the journal, close every file; raises `InputError` where the disk did not take all."""
+        """Write what is queued, end the journal and close all files; raises `InputError` if writing failed."""
         self._pieces.put(None)
         self._thread.join()
         if self._error is not None:
