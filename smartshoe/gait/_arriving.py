@@ -77,6 +77,7 @@ def pieces(
 
 
 def _rows(block: Recording, names: tuple[str, ...]) -> tuple[Array, Array, Mask]:
+    """Times (n,), values (n, c) and mask of missing samples (n, c) of a block, less rows that are wholly missing."""
     lacking = [name for name in names if name not in block.channels]
     if lacking:
         raise InputError(
@@ -148,6 +149,7 @@ class _EvenRun:
         self._values, self._missing = [values], [missing]
 
     def _bridged(self, values: Array, missing: Mask) -> Array:
+        """The values (n, c) with missing samples interpolated, also from the last row given out."""
         found = values.copy()
         at = np.arange(len(values))
         for column in np.flatnonzero(missing.any(axis=0)):
@@ -172,6 +174,7 @@ def joined_head(blocks: Iterator[Recording], least_s: float) -> tuple[Recording 
 
 
 def _joined(blocks: list[Recording], end_s: float) -> Recording:
+    """One recording of several consecutive blocks, up to ``end_s``."""
     from smartshoe.recording import Channel
 
     first = blocks[0]

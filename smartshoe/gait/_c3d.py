@@ -80,6 +80,7 @@ def write_c3d(path: Path | str, found: GaitResult) -> None:
 
 
 def _add_events(made: Any, found: GaitResult, start_s: float) -> None:
+    """Add the events to ``made``, with times in minutes and seconds after ``start_s``, as C3D stores them."""
     made.add_parameter("EVENT", "USED", [len(found.events)])
     for part in range(-(-len(found.events) // LONGEST)):
         # A parameter holds 255 values; further ones go into LABELS2, LABELS3 and so on, as for points.

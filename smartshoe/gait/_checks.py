@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # range of body weights
 WEIGHT_OFF = 0.05
-SILENT = 0.02  # of the foot's peak: a unit that never reads more bears nothing
+SILENT = 0.02  # of the foot's usual peak: a unit that reaches less bears nothing
 FAST = 1.1  # times the calibrated loading rate
 FAST_QUANTILE = 0.995
 LEAST_DRIFT_S = 10.0
@@ -97,6 +97,7 @@ def _one_shoe(foot: str) -> list[Flag]:
 
 
 def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Flag]:
+    """Flags about a whole shoe: absent units, no calibration, low rate, wrong sign, no stance, no swing."""
     flags: list[Flag] = []
     absent = [region for region in REGIONS if region not in foot.regions]
     if absent:
@@ -157,11 +158,13 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
 
 
 def _late(absent: Sequence[str]) -> str:
+    """A clause on how events suffer from absent heel or toe units; '' if neither is absent."""
     affected = [says for region, says in (("heel", "heel strikes late"), ("toe", "toe offs early")) if region in absent]
     return f", {' and '.join(affected)}, and compared with a whole shoe it is no equal" if affected else ""
 
 
 def _units(foot: Foot, series: FootSeries) -> list[Flag]:
+    """Flags about single units: saturated, beyond the calibrated load, or without a response to steps."""
     flags: list[Flag] = []
     whole = float(series.usual_peak.sum())
     for column, (region, unit) in enumerate(zip(foot.regions, foot.units, strict=True)):
@@ -199,6 +202,7 @@ def _units(foot: Foot, series: FootSeries) -> list[Flag]:
 
 
 def _gaps(foot: Foot, series: FootSeries) -> list[Flag]:
+    """Flags for missing samples, separately for long gaps within stances and all others."""
     missing = series.missing
     if not missing.any():
         return []
@@ -249,6 +253,7 @@ def _standing_drift(total: TotalForce, spans: Sequence[tuple[float, float]]) -> 
 
 
 def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[Flag]:
+    """A flag if units are loaded faster than they were calibrated."""
     faster: list[tuple[float, float, str]] = []
     for name, foot in feet.items():
         for unit in foot.units:
@@ -269,6 +274,7 @@ def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[F
 
 
 def _weight(forces: Forces, coverage: float, given_n: float | None) -> list[Flag]:
+    """Flags for a body weight that no person has, and for one that differs from the given one."""
     flags: list[Flag] = []
     weight, mean_n = forces.body_weight, forces.mean_total_n
     found_n = mean_n if mean_n is not None else (weight.value if weight is not None else None)

@@ -162,6 +162,7 @@ class ContactDetector:
         return Contacts.joined(found)
 
     def _none(self) -> Contacts:
+        """No contacts and no floors."""
         r = len(self.regions)
         return Contacts(
             self.regions, np.zeros(0), np.zeros(0), np.zeros((0, r)), np.zeros((0, r)), np.zeros(0), np.zeros((0, r))
@@ -187,6 +188,7 @@ class ContactDetector:
         return contacts
 
     def _found_in(self, window: Array, core_end: int) -> Contacts:
+        """The contacts and floors of a window whose core ends at sample ``core_end``; updates scale and floor."""
         found = cut(window.sum(axis=1), self.sample_rate_hz, self.least_load, self._scale, self._floor)
         if found is None:
             return self._none()
@@ -205,6 +207,7 @@ class ContactDetector:
         return np.asarray(self.start_s + (np.asarray(place) + self._first) / self.sample_rate_hz)
 
     def _new_floors(self, floors: tuple[Floors, Floors], core_end: int) -> Contacts:
+        """The floors before ``core_end`` that were not reported yet."""
         place = np.column_stack([floors[0].place, floors[1].place]).ravel()
         load = np.stack([floors[0].load, floors[1].load], axis=1).reshape(-1, len(self.regions))
         new = (place + self._first > self._last_floor + 1.0) & (place + self._first < core_end)
@@ -217,6 +220,7 @@ class ContactDetector:
         )
 
     def _paired(self, edges: Edges, core_end: int) -> list[Contacts]:
+        """Pair heel strikes with toe offs before ``core_end``; edges that are too close or out of turn are dropped."""
         ended: list[Contacts] = []
         place_s, unit_s = self._time(edges.place), self._time(edges.units)
         nowhere = np.full(len(self.regions), np.nan)

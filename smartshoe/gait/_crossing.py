@@ -3,8 +3,8 @@
 A threshold above the noise is reached late at the onset and left early at the release. Three levels, each twice the one
 below, are crossed at t1, t2, t3; a load that rises as (t - t0)^p crosses them in the ratio (t3 - t2)/(t2 - t1) =
 2^(1/p), whatever its height. The median of that ratio over strides gives p, and t1 - t0 = (t2 - t1)/(2^(1/p) - 1) is
-the delay of the lowest level's crossing after the onset. The running median of that delay over neighbouring strides is
-subtracted, or the part of it that lies below a level lower than the lowest.
+the delay from the onset to the lowest level. The running median of that delay over neighbouring strides is subtracted
+from t1; to find a level between zero and the lowest one, only the part between the two is subtracted.
 
 Near an onset one sampling interval is long: one sample is still on the floor, the next is far above it, and linear
 interpolation between them gives too early a crossing. There the same power law, through the next two samples, gives the

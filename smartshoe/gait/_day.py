@@ -68,13 +68,14 @@ def analyse_stream(
 
 
 def _several(blocks: Iterable[Recording] | Sequence[Iterable[Recording]]) -> list[Iterable[Recording]]:
-    """One iterable for each source; a sequence of recordings is one source."""
+    """One iterable of blocks for each source; a sequence of recordings is a single source."""
     if isinstance(blocks, (list, tuple)) and not any(isinstance(item, Recording) for item in blocks):
         return list(blocks)
     return [cast("Iterable[Recording]", blocks)]
 
 
 def _sources(given: Sequence[Iterable[Recording]]) -> list[tuple[Recording, Iterator[Recording]]]:
+    """Each source's label and channels, as the recording of its first `HEAD_S`, and all its blocks."""
     found: list[tuple[Recording, Iterator[Recording]]] = []
     for blocks in given:
         rest = iter(blocks)
@@ -86,6 +87,8 @@ def _sources(given: Sequence[Iterable[Recording]]) -> list[tuple[Recording, Iter
 
 
 class _Day:
+    """The analysis of a long trial under way: one stream for each foot, running sums, and the first strides."""
+
     def __init__(
         self,
         feet: Mapping[str, Foot],
@@ -160,6 +163,7 @@ class _Day:
         return piece.start_s + piece.first / self._rate(source)
 
     def _begin(self, running: Mapping[int, Piece]) -> None:
+        """Start a run of recording with new streams."""
         self._settled_s = min(self._at(k, piece) for k, piece in running.items())
         self._streams = {
             name: FootStream(self.feet[name], self._channels[name], self._at(k, piece))
@@ -185,6 +189,7 @@ class _Day:
         self._settle(at_end=True)
 
     def _settle(self, *, at_end: bool) -> None:
+        """Analyse all windows whose contacts and floors are known."""
         while self._streams:
             end_s = self._settled_s + WINDOW_S
             last_s = max(stream.end_s for stream in self._streams.values())
@@ -197,6 +202,7 @@ class _Day:
                 self._streams = {}
 
     def _settle_to(self, end_s: float) -> None:
+        """Analyse the window up to ``end_s``, report its events and strides, and drop its samples."""
         windows = {name: stream.window(self._settled_s, end_s) for name, stream in self._streams.items()}
         windows = {name: windows[name] for name in self.feet if name in windows and windows[name][0].time_s.size > 1}
         strides: tuple[Stride, ...] = ()
@@ -256,5 +262,6 @@ class _Day:
 
 
 def _channels_of(foot: Foot, head: Recording) -> tuple[Channel, ...] | None:
+    """The channels of a foot's units in a recording; None if one is not there."""
     found = [head.channels.get(u.name) or head.channels.get(u.name.split("_", 1)[-1]) for u in foot.units]
     return tuple(c for c in found if c is not None) if all(c is not None for c in found) else None

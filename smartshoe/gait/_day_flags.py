@@ -79,6 +79,7 @@ class DayFlags:
         return found
 
     def _of_day(self, key: Key, sums: TrialSums) -> Flag | None:
+        """A window's flag restated for the whole trial; None if it does not hold for the trial."""
         flag, window = self._first[key]
         count = self._counts[key]
         if flag.kind in STEADY:

@@ -137,6 +137,8 @@ class FootStream:
         self._contacts = _chosen(own, keep, slice(max(floors - 1, 0), None))
 
     def _places(self, start_s: float, end_s: float) -> tuple[int, int]:
+        """Indices, among the samples held, of the first sample from ``start_s`` on and from ``end_s`` on."""
+
         def place(at_s: float) -> int:
             if not np.isfinite(at_s):
                 return len(self._load)
@@ -145,6 +147,7 @@ class FootStream:
         return place(start_s), place(end_s)
 
     def _unit(self, column: int, rows: slice) -> UnitLoad:
+        """The loads of one unit in the given rows, with samples on the rail or beyond the calibration marked."""
         model, load = self.model.units[column], self._load[rows, column]
         missing = self._missing[rows, column]
         readings, nothing = self._readings[rows, column], np.zeros(load.size, dtype=bool)

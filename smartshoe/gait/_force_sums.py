@@ -15,7 +15,7 @@ from smartshoe.gait._total import SETTLED_S, whole_strides
 from smartshoe.gait._trial import Foot
 from smartshoe.gait._window import AnalysisWindow
 
-ONE_SHOE_SHARE_SD = 0.05  # of body weight: sd of the share that one foot bears beside a half
+ONE_SHOE_SHARE_SD = 0.05  # of body weight: sd of the mean load on one foot about a half of it
 SWAY_S = 2.0  # length of standing whose means count as independent
 WIDE_SD = 0.05  # of the force: sd assumed if there is a single stride or spell
 
@@ -40,6 +40,8 @@ class Forces:
 
 
 class _FootSums:
+    """Sums over the samples of one foot: its load, its load in swing, and the differences of its floors."""
+
     def __init__(self, regions: int) -> None:
         self.samples = self.swing_samples = 0
         self.load = np.zeros(regions)

@@ -145,6 +145,7 @@ def _out_of_order(series: FootSeries, strides: Sequence[Stride]) -> Flag | None:
 
 
 def _is_inside_out(series: FootSeries) -> bool:
+    """Whether the first metatarsal unit is mostly loaded before the fourth, and more."""
     contacts = series.contacts
     meta4, meta1 = contacts.of_region("meta4"), contacts.of_region("meta1")
     if meta4 is None or meta1 is None or not series.usual_peak[meta1] > series.usual_peak[meta4]:

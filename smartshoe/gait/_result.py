@@ -101,6 +101,7 @@ class GaitFindings(Shown):
         raise UsageError(f"table {table!r} is not known of a {type(self).__name__}: use one of {known}")
 
     def _summary_table(self) -> SummaryTable:
+        """The figures that are single numbers, and the flags, as a table."""
         weight = self.forces.body_weight
         rows = [
             [name.replace("_", " "), significant(value) if isinstance(value, (int, float)) else str(value)]
@@ -188,6 +189,7 @@ class GaitResult(GaitFindings):
 
 
 def _on(base: Array, foot: FootSeries, values: Array) -> Array:
+    """Values (n,) of a foot interpolated at the times ``base``; NaN outside the foot's own times."""
     if base is foot.time_s:
         return values
     return np.asarray(np.interp(base, foot.time_s, values, left=np.nan, right=np.nan))

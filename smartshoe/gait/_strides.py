@@ -126,4 +126,5 @@ def loading_rate(stance_n: Array, rate_hz: float) -> float | None:
 
 
 def _maybe(value: float) -> float | None:
+    """The value, or None if it is not finite."""
     return float(value) if np.isfinite(value) else None

@@ -88,6 +88,7 @@ class StrideSums:
         self._order(contacts, strides)
 
     def _order(self, contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> None:
+        """Count the orders in which units are loaded, and how often the fourth metatarsal precedes the first."""
         for foot, own in contacts.items():
             onset_s = own.onset_s[np.isin(own.strike_s, [s.start_s for s in strides if s.foot == foot])]
             seen = np.isfinite(onset_s)

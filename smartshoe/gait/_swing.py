@@ -82,6 +82,7 @@ def _trend(load: Array, found: Cut) -> Array:
 
 
 def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
+    """The swings with the floor taken as level; None if the load varies too little or no swing is found."""
     noise = white_noise_sd(load)
     wide = boxcar(load, round(WIDE_S * rate_hz))
     low, high = float(wide.min()), float(wide.max())
@@ -106,6 +107,7 @@ def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | No
 
 
 def _low_runs(smooth: Array, off: float, on: float) -> tuple[Index, Index]:
+    """Runs of samples [start, stop) below ``off`` that end where the load exceeds ``on``."""
     code = np.where(smooth >= on, 1, np.where(smooth < off, 0, -1))
     known = np.flatnonzero(code >= 0)
     if known.size == 0:
@@ -130,6 +132,7 @@ def _joined(start: Index, stop: Index, apart: Mask) -> tuple[Index, Index]:
 
 
 def _square(smooth: Array, start: Index, stop: Index, low: float, height: float, rate_hz: float) -> tuple[Index, Index]:
+    """The candidates with steep walls: about as wide at `OFF` as at `UP` of the height."""
     at = np.arange(smooth.size)
     wall = smooth > low + UP * height
     before = np.maximum.accumulate(np.where(wall, at, -1))
@@ -146,6 +149,7 @@ def _square(smooth: Array, start: Index, stop: Index, low: float, height: float,
 
 
 def _without_scuffs(smooth: Array, start: Index, stop: Index, low: float, rate_hz: float) -> tuple[Index, Index]:
+    """Join swings separated by a contact that is shorter and lighter than a stance."""
     if start.size < 3:
         return start, stop
     begins, ends = stop[:-1], start[1:]

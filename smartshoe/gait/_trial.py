@@ -104,6 +104,7 @@ def feet_of(
 
 
 def _by_unit(calibrations: Sequence[Calibration]) -> Mapping[str, Calibration]:
+    """The calibrations by the name of their unit; raises `UsageError` if two have the same."""
     found: dict[str, Calibration] = {}
     for calibration in calibrations:
         if calibration.unit in found:
@@ -118,6 +119,7 @@ def _by_unit(calibrations: Sequence[Calibration]) -> Mapping[str, Calibration]:
 def _sides(
     recording: Recording, number: int, taken: set[str]
 ) -> tuple[dict[str, list[tuple[str, Channel]]], list[Flag]]:
+    """The units' channels of each foot in a recording, with flags; ``taken`` are the feet of earlier recordings."""
     named = {name: channel for name, channel in recording.channels.items() if name in UNITS_OF_A_SHOE}
     if not named:
         raise MissingChannelError(
@@ -159,6 +161,7 @@ def _sides(
 
 
 def _side_named(recording: Recording) -> str | None:
+    """The only foot named in the recording's unit, metadata, name or source; None if there is none."""
     for text in (recording.unit or "", recording.metadata.get("side", ""), recording.name, recording.source):
         found = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", text.casefold())}
         if len(found) == 1:
@@ -173,6 +176,7 @@ def _foot(
     by_name: Mapping[str, Calibration],
     estimator: str | None,
 ) -> Foot:
+    """A foot with its units' loads on an even time base, with the sign turned if compression is negative."""
     if len(recording) < FEWEST_SAMPLES:
         raise InputError(f"{recording.label} holds {len(recording)} samples: a trial needs some seconds of them")
     time_s, rate_hz, on_grid = _even(recording)

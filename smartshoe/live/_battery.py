@@ -46,6 +46,7 @@ class Battery:
         self.checks, self.weight = [[] for _ in self._session.shoes], None
 
     def _weighed(self, recordings: list[Recording]) -> dict[str, float] | None:
+        """The body weight in N with its sd, from all shoes' recordings; None if it cannot be found."""
         calibrations = [c for live in self._session.shoes for c in live.calibrations]
         if not calibrations or not recordings:
             return None
@@ -57,6 +58,7 @@ class Battery:
 
 
 def _examined(live: LiveShoe, recording: Recording) -> list[dict[str, Any]]:
+    """The findings about one shoe as objects for JSON, without the zero, which is set by a button."""
     try:
         found = examine(recording, live.calibrations)
     except SmartShoeError as error:

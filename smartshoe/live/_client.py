@@ -86,6 +86,7 @@ class Client:
             return {"type": "refused", "says": str(error)}
 
     def _do(self, asked: dict[str, Any]) -> dict[str, Any] | None:
+        """Carry out a request, checked to be an object; returns the reply to it, or None."""
         match asked.get("do"):
             case "view":
                 self.view = view_of(asked.get("seconds"), asked.get("columns"))

@@ -85,6 +85,7 @@ class Desk:
             self._checking.join(5.0)
 
     def _check(self) -> None:
+        """Repeat the checks until the desk is closed."""
         while not self._stop.wait(CHECK_EVERY_S):
             try:
                 self.battery.look()

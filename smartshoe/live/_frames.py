@@ -1,4 +1,4 @@
-r"""What goes to a page: one binary frame a picture, and JSON for what is not a picture.
+r"""Messages to a page: binary frames with the traces (JSON carries all else), and the views they are reduced for.
 
 A frame, little-endian:
 

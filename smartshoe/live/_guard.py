@@ -38,6 +38,7 @@ class Guard:
         await self._app(scope, receive, send)
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+        """The status and reason for which a request is refused; None if it is accepted."""
         headers: dict[bytes, list[bytes]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.lower(), []).append(value)
@@ -54,6 +55,7 @@ class Guard:
         return None
 
     def _has_token(self, scope: Scope, authorization: list[bytes]) -> bool:
+        """Whether the query or the Authorization header contains the token."""
         assert self._token is not None
         given = [
             v.encode() for v in parse_qs(scope["query_string"].decode("latin-1"), errors="replace").get("token", [])
@@ -63,6 +65,7 @@ class Guard:
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, says: str) -> None:
+    """Answer a request with a refusal: close a websocket, or send a plain text."""
     if scope["type"] == "websocket":
         await receive()  # websocket.connect
         await send({"type": "websocket.close", "code": 1008, "reason": says})

@@ -53,6 +53,7 @@ class Outlet:
 
 
 def _pylsl() -> Any:
+    """The module pylsl; raises `UsageError` if it or liblsl is missing."""
     try:
         import pylsl
     except (ImportError, RuntimeError, OSError) as error:  # pylsl raises RuntimeError if liblsl is missing

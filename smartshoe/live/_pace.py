@@ -14,7 +14,7 @@ from smartshoe.devices import Block
 
 Number = TypeVar("Number", float, Array)
 
-SLICE_S = 0.02  # on the stream's clock; 30 to 60 frames are drawn a second
+SLICE_S = 0.02  # host time covered by a slice; 30 to 60 frames are drawn a second
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ def interrupted_at(path: Path, sides: Sequence[str]) -> Interrupted | None:
 
 
 def _cut_to_whole_rows(path: Path) -> None:
+    """Remove an incomplete last line."""
     data = path.read_bytes()[-(1 << 16) :]
     torn = len(data) - (data.rfind(b"\n") + 1)
     if torn:
@@ -162,6 +163,7 @@ class LiveRecording:
             raise InputError(self._error)
 
     def _put(self, piece: tuple[int, bytes, int]) -> None:
+        """Queue a piece (shoe or -1 for a note, data, number of samples); never waits."""
         if self._error is not None:
             return
         try:
@@ -172,6 +174,7 @@ class LiveRecording:
             )
 
     def _run(self) -> None:
+        """Write queued pieces in batches until the recording is closed or writing fails."""
         is_over = False
         while not is_over and self._error is None:
             pieces = [self._pieces.get()]
@@ -193,6 +196,7 @@ class LiveRecording:
                 file.close()
 
     def _write(self, pieces: Sequence[tuple[int, bytes, int]]) -> None:
+        """Append pieces to the tables and acknowledge their samples, then append notes to the journal."""
         for shoe, file in enumerate(self._files):
             own = [piece for piece in pieces if piece[0] == shoe]
             if own:

@@ -97,6 +97,7 @@ class LiveShoe:
         return sides.pop() if len(sides) == 1 else ""
 
     def _least(self, foot: LiveFoot) -> float:
+        """The smallest variation of a foot's load that can be a step, in the unit of its shown values."""
         if all(self.symbols[c] == "N" for c in foot.columns):
             return LEAST_LOAD_N
         ranges = [self.ranges[c] for c in foot.columns]
@@ -126,6 +127,7 @@ class LiveShoe:
         ]
 
     def _held(self, shown: Array) -> Array:
+        """The shown values (n, units) with missing ones replaced by the last present one."""
         whole = np.vstack([self._last, shown])
         there = np.isfinite(whole)
         index = np.maximum.accumulate(np.where(there, np.arange(len(whole))[:, None], 0), axis=0)

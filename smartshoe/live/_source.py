@@ -44,8 +44,8 @@ class Source:
         self.live, self._clock = live, clock
         self._take, self._tell, self._fail = take, tell, fail
         self._stop = threading.Event()
-        self._told = 0
-        self._looked_s = -np.inf
+        self._reported = 0
+        self._checked_s = -np.inf
         self._shift_s = 0.0
         self._last: tuple[float, float] | None = None  # device time as handed on, and arrival time
         self._blocks = live.shoe.blocks()
@@ -87,7 +87,7 @@ class Source:
                     self.live.state = "over"
                     return
                 except DeviceError as error:
-                    if self._stop.is_set() or not self._again(error):
+                    if self._stop.is_set() or not self._reopen(error):
                         return
         except SmartShoeError as error:
             self._fail(str(error))
@@ -98,8 +98,8 @@ class Source:
 
     def _one(self, block: Block) -> None:
         now_s = self._clock()
-        if now_s - self._looked_s >= LOOK_EVERY_S or not len(block):
-            self._looked_s = now_s
+        if now_s - self._checked_s >= LOOK_EVERY_S or not len(block):
+            self._checked_s = now_s
             self._look()
         if not len(block):
             return
@@ -113,17 +113,17 @@ class Source:
 
     def _look(self) -> None:
         events = self.live.shoe.events
-        for event in events[self._told :]:
+        for event in events[self._reported :]:
             if isinstance(event, Disconnected):
                 self.live.state = "away"
             elif isinstance(event, Reconnected):
                 self.live.state = "streaming"
             self._tell(event)
-        self._told = len(events)
+        self._reported = len(events)
         if self._last is not None and self.live.state == "streaming" and self._clock() - self._last[1] > SILENT_S:
             self.live.state = "silent"
 
-    def _again(self, error: DeviceError) -> bool:
+    def _reopen(self, error: DeviceError) -> bool:
         """Reopen the shoe, trying until it is there; False if the session ended before that."""
         shoe, lost_s = self.live.shoe, self._clock()
         self._look()
@@ -134,7 +134,7 @@ class Source:
         while not self._stop.wait(backoff.next_wait_s()):
             try:
                 shoe.open()
-                self._told = 0
+                self._reported = 0
                 self._blocks = self._resumed(shoe.blocks())
             except DeviceError:
                 continue

@@ -71,6 +71,7 @@ class StepFollower:
         return found
 
     def _follow(self, at: float, values: list[float]) -> None:
+        """Update the floor and the highest load of each unit, and of their sum."""
         if self._floor is None:
             self._floor, self._top = list(values), list(values)
         passed_s = min(max(at - self._last_s, 0.0), FOLLOW_S)
@@ -85,6 +86,7 @@ class StepFollower:
             self._top[k] = value if value > top else top - (top - self._floor[k]) * passed_s / FORGET_S
 
     def _judged(self, at: float, values: list[float]) -> list[GaitStep]:
+        """Update which units bear load and whether the foot is down; returns the events at this sample."""
         assert self._floor is not None
         rise = self._top[-1] - self._floor[-1]
         share = (values[-1] - self._floor[-1]) / rise if rise >= max(self.least, 1e-9) else 0.0
@@ -99,6 +101,7 @@ class StepFollower:
         return self._within(at) if self._is_down else []
 
     def _within(self, at: float) -> list[GaitStep]:
+        """The events of a foot that stays down: foot flat and heel off, each once a stance."""
         if not self._heel:
             return []
         phase = self.phase

@@ -118,6 +118,7 @@ class PageOperator:
         self._server = self._session = None
 
     def _begin(self, relay: RelayedShoe) -> None:
+        """Open the page: start its session and its server."""
         self._session = LiveSession({str(relay): relay}, clock=relay.clock_s)
         self._session.task = self.task
         self._server = LiveServer(self._session, port=self._port)

@@ -39,7 +39,7 @@ class LiveServer:
         self.host, self.port = host, int(self._socket.getsockname()[1])
         self._data = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._is_told = False
+        self._is_woken = False
         page, policy = document()
         headers = {
             "content-security-policy": policy,
@@ -91,6 +91,7 @@ class LiveServer:
         self._socket.close()
 
     async def _serve(self, ready: Callable[[], None]) -> None:
+        """Run the server and wake its pages until it is stopped."""
         self._loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             # In other threads and on Windows there is no such handler; there Ctrl-C raises KeyboardInterrupt.
@@ -107,8 +108,9 @@ class LiveServer:
             self._socket.close()
 
     def _changed(self) -> None:
-        if not self._is_told and self._loop is not None:
-            self._is_told = True
+        """Wake the pages' loop, from any thread; once until it has run."""
+        if not self._is_woken and self._loop is not None:
+            self._is_woken = True
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(self._data.set)
 
@@ -118,12 +120,13 @@ class LiveServer:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._data.wait(), IDLE_FRAME_S)
             self._data.clear()
-            self._is_told = False
+            self._is_woken = False
             for client in self.desk.clients:
                 client.wake.set()
             await asyncio.sleep(FRAME_S)
 
     async def _page(self, websocket: WebSocket) -> None:
+        """Serve one page's websocket until either side ends it."""
         if len(self.desk.clients) >= MOST_CLIENTS:
             await websocket.close(1013)
             return
@@ -145,6 +148,7 @@ class _OverError(Exception):
 
 
 async def _sent(client: Client, websocket: WebSocket) -> None:
+    """Send the page its messages and frames whenever it is woken."""
     await websocket.send_text(json.dumps(client.hello(), allow_nan=False))
     while True:
         await client.wake.wait()
@@ -158,6 +162,7 @@ async def _sent(client: Client, websocket: WebSocket) -> None:
 
 
 async def _received(client: Client, websocket: WebSocket) -> None:
+    """Take the page's messages until it disconnects."""
     while True:
         message = await websocket.receive()
         if message["type"] == "websocket.disconnect":
@@ -177,6 +182,7 @@ class _Server(uvicorn.Server):
 
 
 def _listening(host: str, port: int) -> socket.socket:
+    """A socket that listens at the address; raises `UsageError` if it cannot."""
     made = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

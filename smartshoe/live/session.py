@@ -91,6 +91,7 @@ class LiveSession:
         self.stop_recording()
 
     def _taker(self, index: int) -> Callable[[Block], None]:
+        """The function that takes in the blocks of one shoe."""
         live = self.shoes[index]
 
         def take(block: Block) -> None:
@@ -116,6 +117,8 @@ class LiveSession:
         return take
 
     def _teller(self, index: int) -> Callable[[ShoeEvent], None]:
+        """The function that notes the events of one shoe."""
+
         def tell(event: ShoeEvent) -> None:
             live = self.shoes[index]
             live.lost += lost_in([event])
@@ -124,6 +127,8 @@ class LiveSession:
         return tell
 
     def _failer(self, index: int) -> Callable[[str], None]:
+        """The function that notes that a shoe's reading has failed."""
+
         def fail(says: str) -> None:
             self.shoes[index].state = "failed"
             self.note("failed", says, shoe=index)
@@ -193,6 +198,7 @@ class LiveSession:
         self.changed()
 
     def _begin_from_start(self, record: Path) -> None:
+        """Record from the start; after an interrupted recording show its notes and use a new file."""
         left = recorder.interrupted_at(record, self._sides())
         path = record
         if left is not None:
@@ -205,6 +211,7 @@ class LiveSession:
             self.note("resumed", f"{left.says}; this goes on in {path.name}")
 
     def _record_to(self, path: Path) -> None:
+        """Start a recording with a table for each shoe."""
         several = len(self.shoes) > 1
         layouts = [
             recorder.Layout(
@@ -255,11 +262,13 @@ class LiveSession:
 
 
 def _of(shoe: Shoe, calibrations: Sequence[Calibration]) -> list[Calibration]:
+    """The calibrations of a shoe's units."""
     names = {channel.name for channel in shoe.describe()}
     return [calibration for calibration in calibrations if calibration.unit in names]
 
 
 def _require_all_used(shoes: Sequence[LiveShoe], calibrations: Sequence[Calibration]) -> None:
+    """Raise `UsageError` for a calibration that fits no unit of the shoes."""
     names = [name for live in shoes for name in live.names]
     for calibration in calibrations:
         if calibration.unit not in names:
@@ -270,6 +279,7 @@ def _require_all_used(shoes: Sequence[LiveShoe], calibrations: Sequence[Calibrat
 
 
 def _require_distinct(shoes: Sequence[LiveShoe]) -> None:
+    """Raise `UsageError` if two shoes have a unit of the same name."""
     seen: dict[str, LiveShoe] = {}
     for live in shoes:
         for name in live.names:

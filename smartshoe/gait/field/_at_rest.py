@@ -16,7 +16,7 @@ from smartshoe.signals.noise import white_noise_sd
 SHORTEST_S = 1.0
 FEWEST = 20
 BLOCK_S = 0.25
-STILL = 0.002  # of full scale, 1.6 N of 800: a person who stands sways by more
+STILL = 0.002  # of full scale, 1.6 N of 800 N: a standing person sways by more
 SETTLED = 0.005  # of full scale over the segment: drift of a silicone tube whose load was just removed
 EVEN = 0.03  # of full scale: how far a unit may lie from what all units share; weight is never that even
 COMMON = 0.2  # of the largest full scale: 8 K are 13.5 % of a 200 mbar range, 16 % of what 800 N read in it
@@ -114,6 +114,7 @@ def zero(
 def _zero_of(
     name: str, time: Array, values: Array, scale: float, shift: float, shared: float, common: float, symbol: str
 ) -> ZeroReading:
+    """The zero of one unit: its mean after removing a linear drift, judged by shift, sway and drift."""
     span = (float(time[0]), float(time[-1]))
     there = np.isfinite(values)
     at, y = time[there], values[there]

@@ -59,6 +59,7 @@ def check_units(
 
 
 def _held(values: Array, there: Mask) -> Array:
+    """The values with missing samples replaced by the last present one, or the first at the start."""
     index = np.maximum.accumulate(np.where(there, np.arange(values.shape[0])[:, None], -1), axis=0)
     first = np.argmax(there, axis=0)
     held = np.take_along_axis(values, np.where(index < 0, first[None, :], index), axis=0)
@@ -66,6 +67,7 @@ def _held(values: Array, there: Mask) -> Array:
 
 
 def _rise(values: Array) -> float:
+    """The range of a unit's readings, from the 2nd to the 98th percentile."""
     low, high = np.quantile(values, (0.02, 0.98))
     return float(high - low)
 
@@ -86,6 +88,7 @@ def _runs(at: Mask) -> list[tuple[int, int]]:
 
 
 def _gaps(time: Array, there: Mask, name: str) -> list[CheckResult]:
+    """A finding if samples are missing for `GAP_S` or longer."""
     long = [(a, b) for a, b in _runs(~there) if time[min(b + 1, time.size - 1)] - time[a] >= GAP_S]
     if not long:
         return []
@@ -102,6 +105,8 @@ def _stuck_or_dead(
     time: Array, values: Array, name: str, rises: Array, scale: Array, k: int, others: list[int],
     presses: list[Index],
 ) -> list[CheckResult]:  # fmt: skip
+    """A finding if unit ``k`` is constant, or hardly responds, while ``others`` are pressed repeatedly."""
+
     def sat_out(first: int, last: int) -> int:
         return int(np.median([np.count_nonzero((presses[j] > first) & (presses[j] <= last)) for j in others]))
 
@@ -129,6 +134,7 @@ def _stuck_or_dead(
 
 
 def _saturated(time: Array, values: Array, name: str, high: float | None, rise: float) -> list[CheckResult]:
+    """A finding if the readings reach their largest value again and again, or for long."""
     top = float(values.max())
     if rise <= 0.0 or (high is not None and top < 0.995 * high):
         return []

@@ -83,6 +83,7 @@ class SwingZero:
         return out
 
     def _held(self, block: Array) -> Array:
+        """The block with values that are not finite replaced by the last finite one."""
         finite = np.isfinite(block)
         if not finite.all():
             whole = np.vstack([self._last, block])
@@ -94,6 +95,7 @@ class SwingZero:
         return block
 
     def _look(self) -> None:
+        """Find new swings in the recent forces and use their levels."""
         first = self._count - self._recent.shape[0]
         total = self._recent.sum(axis=1)
         for swing in swings(total, self.sample_rate_hz, LEAST_RISE * self.full_scale):
@@ -105,6 +107,7 @@ class SwingZero:
             self._renew()
 
     def _renew(self) -> None:
+        """Move the zero towards the level of the last swings if they agree."""
         oldest = self._used - round(WITHIN_S * self.sample_rate_hz)
         self._levels = [level for level in self._levels if level[0] >= oldest][-AGREEING:]
         if len(self._levels) < AGREEING:

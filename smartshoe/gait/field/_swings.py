@@ -11,7 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 
-SHORTEST_S, LONGEST_S = 0.15, 1.0  # a sprinter's swing is longer, a valley of 1 s and more is a foot that rests
+SHORTEST_S, LONGEST_S = 0.15, 1.0  # even a sprinter swings longer than the first; beyond the second a foot rests
 ENTER, LEAVE = 0.10, 0.25  # of the rise above the valley: thresholds below which a swing begins, above which it ends
 FLAT = 0.03  # of the rise: how far a swing's middle may spread or slope; a loaded foot does not stay so constant
 FROM, TO = 0.4, 0.8  # of a swing: by then the shoe is unloaded, and the heel is not yet down
@@ -59,6 +59,7 @@ def swings(total: Array, sample_rate_hz: float, least_rise: float) -> list[Swing
 
 
 def _is_flat(part: Array, rise: float) -> bool:
+    """Whether the middle of a swing neither spreads nor slopes by more than `FLAT` of the rise."""
     third = max(part.size // 3, 1)
     slope = float(part[-third:].mean() - part[:third].mean())
     return bool(part.std() <= FLAT * rise and abs(slope) <= FLAT * rise)

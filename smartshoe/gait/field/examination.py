@@ -320,6 +320,7 @@ def _body_weight(
     body_weight_n: float,
     coverage: float,
 ) -> CheckResult:
+    """Check body weight on the forces of the feet; "unknown" if they cannot be used."""
     finding = _not_weighable(recording, units, forces)
     if finding is not None:
         return finding

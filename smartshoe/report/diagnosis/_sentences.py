@@ -342,7 +342,7 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
 
 
 def ruled_out(cause: Cause) -> list[Neighbour]:
-    """The effects that came near and can be ruled out."""
+    """The rivals that fitted nearly as well but can be ruled out."""
     return neighbours(cause, [rival.effect for rival in _others(cause) if not rival.may_be_likelier])
 
 

@@ -12,7 +12,7 @@ from smartshoe.report.gait import charts, shapes
 from smartshoe.report.gait.terminal import COVERAGE_NOTE, by_foot, depends_on_coverage, weight_mark
 from smartshoe.report.numbers import plain, with_sd
 
-UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # kinds of flags: the numbers mean nothing
+UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # flags: all numbers are meaningless
 
 
 def write_gait_page(path: Path, found: GaitResult, title: str, facts: Mapping[str, str]) -> Path:

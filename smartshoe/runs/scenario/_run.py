@@ -124,7 +124,7 @@ def noise_of(scenario: Scenario, source: ScenarioText) -> tuple[str, float] | No
 
 
 def sample_rate_of(scenario: Scenario, source: ScenarioText) -> float | None:
-    """The lowest ``daq.sample_rate_hz`` above zero that a unit of the scenario states, None where none does."""
+    """The lowest ``daq.sample_rate_hz`` above zero that a unit states; None if no unit states one."""
     stated = _stated(scenario, source, "daq", "sample_rate_hz")
     return min((rate for rate, _ in stated if rate > 0.0), default=None)
 

@@ -1,4 +1,7 @@
-"""What can be wrong with a pressing, seen while the unit still lies under the machine: one function a fault."""
+"""Checks of a pressing for faults, made while the unit still lies under the machine; one function a fault.
+
+The first lines of the docstrings of `AT_THE_END` are shown on the session's page.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ END_OF_RANGE = 0.995
 SATURATED_SAMPLES = 3
 CONTACT_SHARE = 0.02  # of the sensor's range: the smallest rise of a unit that is touched
 LEAST_REST_S = 0.5
-BRIDGED_S = 0.05  # longest distance to the next sample of the stream that counts as covered
+BRIDGED_S = 0.05  # longest time to the nearest sample of the stream for a moment to count as covered
 LARGEST_LOSS = 0.02
 DRIFT_SHARE = 0.02  # of the reading's span
 PEAK_TOLERANCE = 0.05

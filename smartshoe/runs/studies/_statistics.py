@@ -120,7 +120,7 @@ class Agreement:
 
 
 def agreement_of(pairs: Sequence[Array]) -> Agreement:
-    """The agreement of pairs (strides, 2) of each trial; the first column is ours, the second the reference's."""
+    """The agreement of pairs (strides, 2) of each trial: our value and the value of the reference."""
     differences = [own[:, 0] - own[:, 1] for own in pairs]
     means = np.array([own.mean() for own in differences])
     counts = np.array([own.size for own in differences], dtype=float)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 COMPARED = ("stance_time_s", "stance_percent", "peak_n", "impulse_n_s")  # compared with a reference, stride by stride
 SAME_STRIDE_S = 0.15  # heel strikes further apart than this belong to different strides
-COUNTS = ("strides", "order_of_contact", "order_of_contact_percent")  # of a summary: no figures of a person's gait
+COUNTS = ("strides", "order_of_contact", "order_of_contact_percent")  # not figures of the gait itself
 
 
 @dataclass(frozen=True, eq=False)
