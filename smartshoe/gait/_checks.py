@@ -41,9 +41,9 @@ def window_flags(
     """The flags that one window gives rise to; those about whole shoes come first."""
     flags: list[Flag] = []
     if len(feet) == 1:
-        flags += _one_shoe(next(iter(feet)))
+        flags += _one_shoe_flags(next(iter(feet)))
     for name, foot in feet.items():
-        flags += _shoe(foot, series[name], loaded[name], bool(strides or spans))
+        flags += _shoe_flags(foot, series[name], loaded[name], bool(strides or spans))
     labels = label_flags(feet, series, strides)
     flags += labels
     if not labels:
@@ -57,16 +57,16 @@ def window_flags(
             )
         )
     for name, foot in feet.items():
-        flags += _units(foot, series[name])
-        flags += _gaps(foot, series[name])
+        flags += _unit_flags(foot, series[name])
+        flags += _gap_flags(foot, series[name])
     if total is not None and len(feet) > 1:
         flags += _standing_drift(total, spans)
-    return flags + _rates(feet, series)
+    return flags + _rate_flags(feet, series)
 
 
 def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: int, runs: int) -> list[Flag]:
     """The flags that need the whole trial: an implausible body weight, and strides of both walking and running."""
-    flags = _weight(forces, coverage, given_n)
+    flags = _weight_flags(forces, coverage, given_n)
     if walks and runs:
         main = "running" if runs > walks else "walking"
         flags.append(
@@ -84,7 +84,7 @@ def plain_percent(mask: Mask) -> str:
     return f"{share:.0f}" if share >= 10 else f"{share:.2g}"
 
 
-def _one_shoe(foot: str) -> list[Flag]:
+def _one_shoe_flags(foot: str) -> list[Flag]:
     other = "right" if foot == "left" else "left"
     return [
         Flag(
@@ -96,7 +96,7 @@ def _one_shoe(foot: str) -> list[Flag]:
     ]
 
 
-def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Flag]:
+def _shoe_flags(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Flag]:
     """Flags about a whole shoe: absent units, no calibration, low rate, wrong sign, no stance, no swing."""
     flags: list[Flag] = []
     absent = [region for region in REGIONS if region not in foot.regions]
@@ -105,7 +105,7 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
             Flag(
                 "missing_unit",
                 f"the {foot.name} shoe has no column for {', '.join(absent)}: what they bear is in no force"
-                + _late(absent),
+                + _late_events(absent),
                 foot=foot.name,
                 unit=", ".join(absent),
             )
@@ -157,13 +157,13 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
     return flags
 
 
-def _late(absent: Sequence[str]) -> str:
+def _late_events(absent: Sequence[str]) -> str:
     """A clause on how events suffer from absent heel or toe units; '' if neither is absent."""
     affected = [says for region, says in (("heel", "heel strikes late"), ("toe", "toe offs early")) if region in absent]
     return f", {' and '.join(affected)}, and compared with a whole shoe it is no equal" if affected else ""
 
 
-def _units(foot: Foot, series: FootSeries) -> list[Flag]:
+def _unit_flags(foot: Foot, series: FootSeries) -> list[Flag]:
     """Flags about single units: saturated, beyond the calibrated load, or without a response to steps."""
     flags: list[Flag] = []
     whole = float(series.usual_peak.sum())
@@ -201,7 +201,7 @@ def _units(foot: Foot, series: FootSeries) -> list[Flag]:
     return flags
 
 
-def _gaps(foot: Foot, series: FootSeries) -> list[Flag]:
+def _gap_flags(foot: Foot, series: FootSeries) -> list[Flag]:
     """Flags for missing samples, separately for long gaps within stances and all others."""
     missing = series.missing
     if not missing.any():
@@ -252,7 +252,7 @@ def _standing_drift(total: TotalForce, spans: Sequence[tuple[float, float]]) -> 
     return []
 
 
-def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[Flag]:
+def _rate_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[Flag]:
     """A flag if units are loaded faster than they were calibrated."""
     faster: list[tuple[float, float, str]] = []
     for name, foot in feet.items():
@@ -273,7 +273,7 @@ def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[F
     ]
 
 
-def _weight(forces: Forces, coverage: float, given_n: float | None) -> list[Flag]:
+def _weight_flags(forces: Forces, coverage: float, given_n: float | None) -> list[Flag]:
     """Flags for a body weight that no person has, and for one that differs from the given one."""
     flags: list[Flag] = []
     weight, mean_n = forces.body_weight, forces.mean_total_n

@@ -89,7 +89,7 @@ def estimate(
     readings, missing = bridged(np.arange(present.size, dtype=float), channel.values, present), ~present
     nothing = np.zeros(present.size, dtype=bool)
     is_force = channel.unit.quantity == "force"
-    begin = _way(name, channel, rate_hz, None if is_force else calibration, estimator, readings)
+    begin = _conversion(name, channel, rate_hz, None if is_force else calibration, estimator, readings)
     run = begin()
     (load, sd_n), (rest, rest_sd_n) = run.push(readings, missing), run.finish()
     if rest.size:
@@ -106,7 +106,7 @@ def estimate(
     return replace(found, beyond=load > BEYOND * largest if largest else nothing, range_n=largest, rate_n_per_s=rate)
 
 
-def _way(
+def _conversion(
     name: str,
     channel: Channel,
     rate_hz: float,

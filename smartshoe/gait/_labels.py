@@ -100,16 +100,16 @@ def _exchanged_sides(feet: Mapping[str, Foot], series: Mapping[str, FootSeries])
     second = feet["right"].load
     count = min(len(first), len(second), round(LOOKED_S * feet["left"].rate_hz))
     first, second = first[:count], second[:count]
-    now = _quiet(first.sum(axis=1)) + _quiet(second.sum(axis=1))
+    now = _quiet_share(first.sum(axis=1)) + _quiet_share(second.sum(axis=1))
     gains: list[tuple[float, str]] = []
     for column, region in enumerate(feet["left"].regions):
         moved = second[:, column] - first[:, column]
-        gains.append((_quiet(first.sum(axis=1) + moved) + _quiet(second.sum(axis=1) - moved) - now, region))
+        gains.append((_quiet_share(first.sum(axis=1) + moved) + _quiet_share(second.sum(axis=1) - moved) - now, region))
     gain, region = max(gains)
     return region if gain > QUIETER else None
 
 
-def _quiet(whole: Array) -> float:
+def _quiet_share(whole: Array) -> float:
     """The share of time during which a foot's load (n,) is near its floor."""
     low, high = np.quantile(whole, [0.01, 0.95])
     return float(np.mean(whole < low + 0.1 * (high - low))) if high > low else 0.0

@@ -173,22 +173,22 @@ class GaitResult(GaitFindings):
         for name, foot in self.feet.items():
             suffix = "n" if foot.is_force else foot.symbol.casefold()
             for column, region in enumerate(foot.regions):
-                found[f"{name}_{region}_{suffix}"] = _on(base, foot, foot.load[:, column])
+                found[f"{name}_{region}_{suffix}"] = _interpolated(base, foot, foot.load[:, column])
             if foot.force_n is not None:
-                found[f"{name}_total_n"] = _on(base, foot, foot.force_n)
+                found[f"{name}_total_n"] = _interpolated(base, foot, foot.force_n)
             if foot.sd_n is not None:
-                found[f"{name}_total_sd_n"] = _on(base, foot, foot.sd_n)
+                found[f"{name}_total_sd_n"] = _interpolated(base, foot, foot.sd_n)
         if self.total_n is not None:
             found["total_n"] = np.interp(base, self.total_time_s, self.total_n, left=np.nan, right=np.nan)
         for name, foot in self.feet.items():
             for column, way in enumerate(("along", "medial")):
-                found[f"{name}_centre_{way}_percent"] = 100.0 * _on(base, foot, foot.centre[:, column])
+                found[f"{name}_centre_{way}_percent"] = 100.0 * _interpolated(base, foot, foot.centre[:, column])
             nearest = np.clip(np.round((base - foot.time_s[0]) * foot.rate_hz).astype(int), 0, foot.time_s.size - 1)
             found[f"{name}_phase"] = foot.state[nearest]
         return found
 
 
-def _on(base: Array, foot: FootSeries, values: Array) -> Array:
+def _interpolated(base: Array, foot: FootSeries, values: Array) -> Array:
     """Values (n,) of a foot interpolated at the times ``base``; NaN outside the foot's own times."""
     if base is foot.time_s:
         return values

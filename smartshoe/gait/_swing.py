@@ -94,7 +94,7 @@ def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | No
     smooth = boxcar(load, round(SMOOTH_S * rate_hz))
     start, stop = _low_runs(smooth, low + OFF * height, low + ON * height)
     start, stop = _without_short(start, stop, smooth.size, rate_hz)
-    start, stop = _square(smooth, start, stop, low, height, rate_hz)
+    start, stop = _with_steep_walls(smooth, start, stop, low, height, rate_hz)
     if start.size and floor is not None and scale is not None and start.size < RHYTHM:
         total = np.concatenate([[0.0], np.cumsum(smooth)])
         level = (total[stop] - total[start]) / (stop - start)
@@ -131,7 +131,9 @@ def _joined(start: Index, stop: Index, apart: Mask) -> tuple[Index, Index]:
     return start[np.concatenate([[True], apart])], stop[np.concatenate([apart, [True]])]
 
 
-def _square(smooth: Array, start: Index, stop: Index, low: float, height: float, rate_hz: float) -> tuple[Index, Index]:
+def _with_steep_walls(
+    smooth: Array, start: Index, stop: Index, low: float, height: float, rate_hz: float
+) -> tuple[Index, Index]:
     """The candidates with steep walls: about as wide at `OFF` as at `UP` of the height."""
     at = np.arange(smooth.size)
     wall = smooth > low + UP * height

@@ -83,7 +83,7 @@ class Source:
                     for block in self._blocks:
                         if self._stop.is_set():
                             return
-                        self._one(block)
+                        self._take_block(block)
                     self.live.state = "over"
                     return
                 except DeviceError as error:
@@ -96,11 +96,11 @@ class Source:
             self._fail(f"{self.live.shoe}: {failure_of_others(error) or why}")
             raise
 
-    def _one(self, block: Block) -> None:
+    def _take_block(self, block: Block) -> None:
         now_s = self._clock()
         if now_s - self._checked_s >= LOOK_EVERY_S or not len(block):
             self._checked_s = now_s
-            self._look()
+            self._report_events()
         if not len(block):
             return
         arrival_s = now_s if block.arrival_s is None else float(block.arrival_s[-1])
@@ -111,7 +111,7 @@ class Source:
         self.live.state = "streaming"
         self._take(block)
 
-    def _look(self) -> None:
+    def _report_events(self) -> None:
         events = self.live.shoe.events
         for event in events[self._reported :]:
             if isinstance(event, Disconnected):
@@ -126,7 +126,7 @@ class Source:
     def _reopen(self, error: DeviceError) -> bool:
         """Reopen the shoe, trying until it is there; False if the session ended before that."""
         shoe, lost_s = self.live.shoe, self._clock()
-        self._look()
+        self._report_events()
         self.live.state = "away"
         self._tell(Disconnected(lost_s, str(error)))
         shoe.close()

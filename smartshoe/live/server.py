@@ -135,8 +135,8 @@ class LiveServer:
         self.desk.clients.add(client)
         try:
             async with asyncio.TaskGroup() as tasks:
-                tasks.create_task(_sent(client, websocket))
-                tasks.create_task(_received(client, websocket))
+                tasks.create_task(_send(client, websocket))
+                tasks.create_task(_receive(client, websocket))
         except* (_OverError, WebSocketDisconnect, OSError):
             pass
         finally:
@@ -147,7 +147,7 @@ class _OverError(Exception):
     """Raised when a page has gone, to end the other task of its connection."""
 
 
-async def _sent(client: Client, websocket: WebSocket) -> None:
+async def _send(client: Client, websocket: WebSocket) -> None:
     """Send the page its messages and frames whenever it is woken."""
     await websocket.send_text(json.dumps(client.hello(), allow_nan=False))
     while True:
@@ -161,7 +161,7 @@ async def _sent(client: Client, websocket: WebSocket) -> None:
             await websocket.send_bytes(frame)
 
 
-async def _received(client: Client, websocket: WebSocket) -> None:
+async def _receive(client: Client, websocket: WebSocket) -> None:
     """Take the page's messages until it disconnects."""
     while True:
         message = await websocket.receive()

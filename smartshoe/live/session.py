@@ -52,7 +52,7 @@ class LiveSession:
         self.changed = changed
         self.began = datetime.datetime.now(datetime.UTC)
         self.pace = Pace(clock, clock(), speed)
-        self.shoes = [LiveShoe(url, shoe, _of(shoe, calibrations)) for url, shoe in shoes.items()]
+        self.shoes = [LiveShoe(url, shoe, _calibrations_of(shoe, calibrations)) for url, shoe in shoes.items()]
         _require_all_used(self.shoes, calibrations)
         _require_distinct(self.shoes)
         self.recording: recorder.LiveRecording | None = None
@@ -261,7 +261,7 @@ class LiveSession:
         }
 
 
-def _of(shoe: Shoe, calibrations: Sequence[Calibration]) -> list[Calibration]:
+def _calibrations_of(shoe: Shoe, calibrations: Sequence[Calibration]) -> list[Calibration]:
     """The calibrations of a shoe's units."""
     names = {channel.name for channel in shoe.describe()}
     return [calibration for calibration in calibrations if calibration.unit in names]

@@ -120,7 +120,7 @@ def shares(charts: Sequence[Chart], page_bytes: float = PAGE_BYTES) -> list[int]
     return allowed
 
 
-def _kept(chart: Chart, most: int) -> NDArray[np.intp]:
+def _kept_indices(chart: Chart, most: int) -> NDArray[np.intp]:
     """Indices of about ``most`` samples: the extremes, and all in the window if they are at most half of these."""
     signals = [line.values for line in chart.lines]
     if chart.window is not None and chart.x.size > most:
@@ -157,7 +157,7 @@ def _line(line: Line, index: Index) -> dict[str, Any]:
 
 def packed(chart: Chart, most: int) -> dict[str, Any]:
     """The chart as an object for the page's script, with about ``most`` points at most."""
-    index = _kept(chart, most)
+    index = _kept_indices(chart, most)
     x0 = float(chart.x[0]) if chart.x.size else 0.0
     return {
         "title": chart.title,

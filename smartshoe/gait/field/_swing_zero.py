@@ -79,7 +79,7 @@ class SwingZero:
             self._count += take
             at += take
             if self._count % self._hop == 0:
-                self._look()
+                self._find_swings()
         return out
 
     def _held(self, block: Array) -> Array:
@@ -94,7 +94,7 @@ class SwingZero:
             self._last = block[-1].copy()
         return block
 
-    def _look(self) -> None:
+    def _find_swings(self) -> None:
         """Find new swings in the recent forces and use their levels."""
         first = self._count - self._recent.shape[0]
         total = self._recent.sum(axis=1)
@@ -104,9 +104,9 @@ class SwingZero:
             self._used = first + swing.stop
             rise = float(np.quantile(total, 0.98) - np.quantile(total, 0.02))
             self._levels.append((self._used, self._recent[swing.middle].mean(axis=0), rise))
-            self._renew()
+            self._update_zero()
 
-    def _renew(self) -> None:
+    def _update_zero(self) -> None:
         """Move the zero towards the level of the last swings if they agree."""
         oldest = self._used - round(WITHIN_S * self.sample_rate_hz)
         self._levels = [level for level in self._levels if level[0] >= oldest][-AGREEING:]

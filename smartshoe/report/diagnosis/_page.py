@@ -90,14 +90,14 @@ def _of_traces(diagnosis: Diagnosis, found: EvidenceView | None) -> dict[str, An
     over = [*charts.over_state(found, unit), charts.over_cycles(found, unit), charts.over_frequency(found, unit)]
     maps = by_load_and_rate(found, found.after, traces), by_place_and_cycle(found, found.after)
     return {
-        "before_after": _there([charts.over_time(found, unit), charts.worst(traces, unit)]),
-        "over": _there(over),
+        "before_after": _without_none([charts.over_time(found, unit), charts.worst(traces, unit)]),
+        "over": _without_none(over),
         "loops": charts.loops(traces, unit),
         "left": grids.left_grids(*maps, unit),
     }
 
 
-def _there(given: Sequence[Chart | None]) -> list[Chart]:
+def _without_none(given: Sequence[Chart | None]) -> list[Chart]:
     return [chart for chart in given if chart is not None]
 
 

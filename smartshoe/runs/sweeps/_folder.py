@@ -59,7 +59,7 @@ class SweepFolder:
                 f"{self.cases} holds cases of an unknown sweep ({note.name} is gone): choose another --out"
             )
         write_text(note, json_text(_plain(mine)))
-        self._sweep_up()
+        self._remove_unfinished()
 
     def _note(self, note: Path) -> dict[str, Any]:
         try:
@@ -83,7 +83,7 @@ class SweepFolder:
                 f" this one): {begun}choose another --out"
             )
 
-    def _sweep_up(self) -> None:
+    def _remove_unfinished(self) -> None:
         """Remove unfinished files of killed processes."""
         with os.scandir(self.cases) as entries:
             for entry in entries:
@@ -151,7 +151,7 @@ def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
     kinds: dict[str, str] = {}
     for name in plan.names():
         for figure, value in folder.read(name)["figures"].items():
-            kinds[figure] = _wider(kinds.get(figure), value)
+            kinds[figure] = _wider_kind(kinds.get(figure), value)
     figures = list(kinds)
     with replacing(folder.path / "results.csv") as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -159,7 +159,7 @@ def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
         for number, name in enumerate(plan.names()):
             case, values = folder.read(name), plan.design.values(number)
             own = case["figures"]
-            kinds.update({key: _wider(kinds.get(key), values[key]) for key in keys})
+            kinds.update({key: _wider_kind(kinds.get(key), values[key]) for key in keys})
             writer.writerow(
                 [
                     *(_cell(values[key]) for key in keys),
@@ -173,7 +173,7 @@ def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
     return {**kinds, "seed": "int", "status": "text", "says": "text", "case": "text"}
 
 
-def _wider(kind: str | None, value: Any) -> str:
+def _wider_kind(kind: str | None, value: Any) -> str:
     """The narrowest kind of column that can hold values of ``kind`` and ``value``."""
     if value is None:
         return kind or ""
