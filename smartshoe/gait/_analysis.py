@@ -42,26 +42,26 @@ def analyse(
         plain table: ``left_heel_n`` is a force already, ``left_heel_mbar`` becomes one by the calibration of that unit;
         without any calibration there are events and times, and no force.
     calibrations
-        Of the units: calibrations, the paths of their files, or a folder of them.
+        Calibrations of the units, the paths of their files, or a folder of them.
     body_weight_n
-        In N; estimated where it is not given.
+        Body weight in N; estimated from the forces if it is not given.
     coverage
         The share of the load that passes through the units, by which forces of feet are divided, or a `Coverage` with
-        its course over a stance.
+        a course over the stance.
     reference
-        A trial whose mean strides are the pattern that strides are compared with; each foot's own without.
+        A trial whose mean strides are the pattern with which strides are compared; without it, each foot's own mean.
     estimator
-        A name of `smartshoe.calibration.estimators.estimator_names`, for forces with error bars; None is the
+        A name of `smartshoe.calibration.estimators.estimator_names`, for forces with error bars; None means the
         calibrations' own filter.
 
     Raises
     ------
     InputError
-        For recordings that are no trial (`MissingChannelError`, `UnitError`).
+        If the recordings are no trial (also `MissingChannelError`, `UnitError`).
     UsageError
-        For arguments out of range.
+        If an argument is out of range.
     RefusedError
-        Where neither a stance nor a standing load is found.
+        If neither a stance nor a standing load is found.
 
     Examples
     --------

@@ -92,7 +92,7 @@ class Chart:
 
 
 def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
-    """Indices of about ``most`` samples at most that keep the extremes of every signal in each segment."""
+    """Indices (k,), at most about ``most``, of samples that keep the extremes of every signal in each segment."""
     if x.size <= most:
         return np.arange(x.size)
     block = -(-x.size * 2 * len(signals) // most)

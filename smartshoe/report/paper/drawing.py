@@ -32,7 +32,7 @@ STYLE: Any = {
 
 
 def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
-    """Reduce to about `MOST` points at most that keep the extremes of the first signal in each segment."""
+    """Reduce to at most about `MOST` points that keep the extremes of the first signal in each segment."""
     if x.size <= MOST:
         return (x, *signals)
     block = -(-x.size // (MOST // 2))

@@ -146,7 +146,10 @@ def _refuse_reserved(options: dict[str, Any]) -> None:
 
 
 class UnitTable(_OpenTable):
-    """``[[unit]]``: a sensing unit; its recordings are files, or come from the machine (further keys are its)."""
+    """``[[unit]]``: a sensing unit.
+
+    Its recordings are files, or are made by the machine; then all other keys are options of the machine.
+    """
 
     name: FileName
     recordings: tuple[str, ...] = ()

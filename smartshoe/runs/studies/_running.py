@@ -162,13 +162,13 @@ def study(
     Parameters
     ----------
     path
-        The study's file: ``title``, ``calibrations``, and a ``[[trial]]`` each with file, subject and condition.
+        The study's file: ``title``, ``calibrations``, and for each trial a ``[[trial]]`` with file, subject, condition.
     out
-        Where ``study.html``, ``study.json``, ``trials.csv`` and ``differences.csv`` go; None writes nothing.
+        Folder for ``study.html``, ``study.json``, ``trials.csv`` and ``differences.csv``; None writes nothing.
     jobs
-        Processes on this machine; None: one a core. Each holds one trial at a time.
+        Number of processes on this machine; None means one for each core. Each holds one trial at a time.
     c3d
-        Write each trial as C3D with its events too, below ``out/c3d`` (needs the extra ``c3d``).
+        Also write each trial with its events as C3D, below ``out/c3d`` (needs the extra ``c3d``).
     progress
         Called with the number of trials done and to do.
 
@@ -177,9 +177,9 @@ def study(
     ScenarioError
         The study's file is wrong.
     InputError
-        A table of norms that cannot be read, or names a condition that no trial has.
+        A table of norms cannot be read, or names a condition that no trial has.
     RefusedError
-        No trial could be used; one that cannot is left out and stops nothing.
+        No trial could be used. If only some cannot, they are left out.
     """
     plan, source = read_study(path)
     if c3d and out is None:

@@ -41,10 +41,7 @@ class Case:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """A scenario and its design.
-
-    ``base`` are the scenario's tables without ``[sweep]``. ``_digests`` caches the hashes of the files that it reads.
-    """
+    """A scenario and its design; ``base`` are the scenario's tables without ``[sweep]``."""
 
     source: ScenarioText
     base: Tables

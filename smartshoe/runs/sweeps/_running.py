@@ -75,32 +75,32 @@ def sweep(
 ) -> SweepResult:
     """Run a scenario for each case of its ``[sweep]``, and gather the figures in one table.
 
-    A case is computed once: the same call again goes on where the last one stopped.
+    Each case is computed once: the same call again continues where the last one stopped.
 
     Parameters
     ----------
     scenario
         The scenario's file, with a table ``[sweep]``.
     out
-        The sweep's folder. ``cases/`` gets one JSON a case, ``results.csv`` (``.parquet`` where pyarrow is there) one
-        row a case, ``sweep.html`` what drives the figures.
+        The sweep's folder. ``cases/`` gets a JSON file for each case, ``results.csv`` (and ``.parquet`` if pyarrow is
+        installed) a row for each case, and ``sweep.html`` shows what drives the figures.
     jobs
-        Processes on this machine; None: one a core; 1: this process.
+        Number of processes on this machine; None means one for each core, 1 this process.
     scheduler
         Address of a Dask scheduler (``tcp://host:8786``) whose workers compute instead.
     shard
-        (k, n): only every n-th case from the k-th on (1-based), for one of n runs that share the folder.
+        (k, n): compute only every n-th case from the k-th on (1-based), as one of n runs that share the folder.
     progress
-        Called with the number of cases done and to do, of this run.
+        Called with the number of cases done and to do in this run.
 
     Raises
     ------
     ScenarioError
         The scenario or its ``[sweep]`` is wrong.
     UsageError
-        The folder is another sweep's, or cannot be written.
+        The folder belongs to another sweep, or cannot be written.
     DeviceError
-        The scheduler is not there or went away, or workers are killed again and again.
+        The scheduler cannot be reached or was lost, or workers are killed again and again.
     """
     return sweep_plan(read_plan(scenario), Path(out), jobs, scheduler, shard, progress)
 
