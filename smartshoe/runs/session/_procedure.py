@@ -75,7 +75,7 @@ def _check_limits(machine: MachineSide, protocols: list[Protocol]) -> None:
 
 
 def _check_range(plan: SessionPlan, shoe: Shoe, protocols: list[Protocol], operator: Operator) -> None:
-    """Refuse loads beyond the sensor's range, which an earlier calibration lets predict."""
+    """Refuse loads at which, by an earlier calibration, the reading would exceed the sensor's range."""
     channel = next(channel for channel in shoe.describe() if channel.name == plan.unit)
     earlier = _earlier(plan)
     if channel.range_ is None or earlier is None or earlier.reading_unit.quantity != channel.unit.quantity:
