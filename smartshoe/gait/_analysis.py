@@ -57,7 +57,7 @@ def analyse(
     Raises
     ------
     InputError
-        If the recordings are no trial (also `MissingChannelError`, `UnitError`).
+        If the recordings cannot be analysed as a trial (also `MissingChannelError`, `UnitError`).
     UsageError
         If an argument is out of range.
     RefusedError

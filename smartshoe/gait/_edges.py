@@ -13,7 +13,7 @@ from smartshoe.gait._swing import Cut
 BEARS = 0.02  # of body weight: above it a foot or a unit bears load; force plates are read at 10 to 20 N
 UNIT_LEVEL = 0.06  # of a unit's own median peak: its lowest level
 MOST_LEVEL = 0.12  # of the median peak: upper limit of the lowest level
-LONGEST_SWING_S = 1.0  # in a longer swing the foot rests, and its mean load is no measure of body weight
+LONGEST_SWING_S = 1.0  # in a longer swing the foot rests, and its mean load does not measure body weight
 WALKING_STANCE_S = 0.4  # a runner's is shorter
 RUNNING_PEAK = 2.5  # body weights; Munro et al. 1987 (J. Biomech. 20, 147-155): 2.5 at 3 m/s, 2.8 at 5 m/s
 TOP = 5.0  # times the lowest level: above it the foot is certainly loaded

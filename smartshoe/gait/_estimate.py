@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from smartshoe.calibration.estimators import ForceEstimate, ForceRun
 
 
-BEYOND = 1.02  # times the largest calibrated load: noise at the limit is no extrapolation
+BEYOND = 1.02  # times the largest calibrated load: noise at the limit does not count as extrapolation
 RAIL_RUN, RAIL_LONG = 4, 100  # equal samples in a row; no peak of a load is flat for as long as RAIL_LONG
 MOST_TIED = 0.5
 RAIL_STEEP = 4.0  # in resolutions: how much a load still rises in the sample before it reaches its rail

@@ -21,7 +21,7 @@ class FootSeries:
     """One foot over time; all arrays are (n,) or (n, r) at the times ``time_s`` (n,).
 
     ``load`` (n, r) is the load of each unit above its floor, in N if ``is_force``. ``force_n`` (n,) is the force on the
-    whole foot, corrected for coverage, None if the loads are no forces. ``sd_n`` (n,) is its error bar from the
+    whole foot, corrected for coverage, None if the loads are not in N. ``sd_n`` (n,) is its error bar from the
     estimator, None without one; it does not include the error of the coverage. ``centre`` (n, 2) is the centre of
     pressure, along and medial, as shares of the insole's length, NaN in swing. ``state`` (n,) is an index into
     `smartshoe.gait.phases.PHASES`. ``membership`` (n, 6) refers to `smartshoe.gait.membership.PHASES`; ``abnormality``

@@ -78,7 +78,7 @@ def feet_of(
 
     One recording may hold both shoes; two recordings hold one each. Columns without a side belong to the side named in
     the recording's unit, name or file. Raises `InputError` if no unit of a shoe is there, `UsageError` if two
-    recordings or two calibrations claim the same unit, and `UnitError` for units that are no loads.
+    recordings or two calibrations claim the same unit, and `UnitError` for columns that are not loads.
     """
     if not recordings:
         raise UsageError("a trial needs at least one recording: give one")

@@ -23,7 +23,7 @@ class AnalysisWindow:
     """What was found from ``start_s`` on and before ``end_s``; ``feet``, ``series`` and ``contacts`` reach beyond it.
 
     ``strides`` are those that begin in the window; ``spans`` are begin and end of spells of standing, not cut at the
-    window's ends. ``total`` is the sum of the feet's forces, None if one foot's loads are no forces.
+    window's ends. ``total`` is the sum of the feet's forces, None if a foot's loads are not in N.
     """
 
     start_s: float

@@ -27,7 +27,7 @@ then for each shoe
 \      f32[n c]     greatest value
 ====== ============ ============================================================
 
-A column that was sent before is sent again while samples are still added to it. NaN is no value.
+A column that was sent before is sent again while samples are still added to it. NaN means no value.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ def free_path(path: Path, sides: Sequence[str]) -> Path:
 def interrupted_at(path: Path, sides: Sequence[str]) -> Interrupted | None:
     """What a killed session left at ``path``; its tables are cut to whole rows. None if there is nothing.
 
-    Raises `UsageError` if the recording there was ended properly, or if the file there is no recording.
+    Raises `UsageError` if the recording there was ended properly, or if the file there is not a recording.
     """
     if not is_taken(path, sides):
         return None

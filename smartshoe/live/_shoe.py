@@ -35,7 +35,7 @@ class LiveFoot:
 
 
 def feet_of(names: Sequence[str]) -> tuple[LiveFoot, ...]:
-    """The feet whose units are among ``names``; a name that is no unit of a shoe is ignored."""
+    """The feet whose units are among ``names``; other names are ignored."""
     by_side: dict[str, list[int]] = {}
     for column, name in enumerate(names):
         side, _, region = name.rpartition("_")

@@ -39,7 +39,7 @@ def swings(total: Array, sample_rate_hz: float, least_rise: float) -> list[Swing
     """Swings that begin and end within ``total`` (n,): some seconds of a foot's summed load, in any unit.
 
     The valley is the lowest level in ``total``, so an offset changes nothing. A rise above it of less than
-    ``least_rise``, in the same unit, is no step.
+    ``least_rise``, in the same unit, is not a step.
     """
     low, high = (float(x) for x in np.quantile(total, (0.02, 0.98)))
     rise = high - low

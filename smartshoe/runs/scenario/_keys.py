@@ -33,7 +33,7 @@ def path_of(tables: Mapping[str, Any], key: str) -> KeyPath:
 def with_values(tables: Tables, values: Mapping[str, Any]) -> Tables:
     """A copy of ``tables`` with ``values`` by key; missing tables are created.
 
-    Raises `ScenarioError` for a key below something that is no table.
+    Raises `ScenarioError` for a key below a value that is not a table.
     """
     for key, value in values.items():
         tables = _replaced(tables, path_of(tables, key), value, key)

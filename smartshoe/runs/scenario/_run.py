@@ -116,7 +116,7 @@ def protocols_of(scenario: Scenario, source: ScenarioText) -> dict[str, Protocol
 def noise_of(scenario: Scenario, source: ScenarioText) -> tuple[str, float] | None:
     """The unit with the largest ``sensor.noise_percent`` above zero and that value; None if no unit states one.
 
-    Raises `ScenarioError` for a value that is no number from 0 on.
+    Raises `ScenarioError` for a value that is not a number from 0 on.
     """
     stated = _stated(scenario, source, "sensor", "noise_percent")
     largest, name = max(stated, key=lambda one: one[0], default=(0.0, ""))
