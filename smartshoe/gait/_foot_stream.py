@@ -152,7 +152,7 @@ class FootStream:
         missing = self._missing[rows, column]
         readings, nothing = self._readings[rows, column], np.zeros(load.size, dtype=bool)
         saturated = nothing
-        if readings.size and readings.max() >= self._top[column]:  # a value that was exceeded earlier cannot be the rail
+        if readings.size and readings.max() >= self._top[column]:  # a value exceeded earlier is not the rail
             channel = replace(self._channels[column], values=readings, missing=missing if missing.any() else None)
             saturated = on_the_rail(channel)
         beyond = load > BEYOND * model.range_n if model.range_n else nothing
