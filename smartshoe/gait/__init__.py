@@ -1,4 +1,8 @@
-"""Trials: from a shoe's loads to events, phases, strides and forces. `analyse` is the verb, `GaitResult` its noun."""
+"""Gait analysis: from a shoe's loads to events, phases, strides and forces.
+
+`analyse` and `analyse_stream` analyse a trial; `GaitResult` and `DayResult` hold what they found. Names are imported
+from their modules on first use.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`analyse`: a trial's recordings to events, phases, strides, forces and flags."""
+"""`analyse`: from a trial's recordings to events, phases, strides, forces and flags."""
 
 from __future__ import annotations
 
@@ -42,26 +42,26 @@ def analyse(
         plain table: ``left_heel_n`` is a force already, ``left_heel_mbar`` becomes one by the calibration of that unit;
         without any calibration there are events and times, and no force.
     calibrations
-        Of the units: calibrations, the paths of their files, or a folder of them.
+        Calibrations of the units, the paths of their files, or a folder of them.
     body_weight_n
-        In N; estimated where it is not given.
+        Body weight in N; estimated from the forces if it is not given.
     coverage
         The share of the load that passes through the units, by which forces of feet are divided, or a `Coverage` with
-        its course over a stance.
+        a course over the stance.
     reference
-        A trial whose mean strides are the pattern that strides are compared with; each foot's own without.
+        A trial whose mean strides are the pattern with which strides are compared; without it, each foot's own mean.
     estimator
-        A name of `smartshoe.calibration.estimators.estimator_names`, for forces with error bars; None is the
+        A name of `smartshoe.calibration.estimators.estimator_names`, for forces with error bars; None means the
         calibrations' own filter.
 
     Raises
     ------
     InputError
-        For recordings that are no trial (`MissingChannelError`, `UnitError`).
+        If the recordings cannot be analysed as a trial (also `MissingChannelError`, `UnitError`).
     UsageError
-        For arguments out of range.
+        If an argument is out of range.
     RefusedError
-        Where neither a stance nor a standing load is found.
+        If neither a stance nor a standing load is found.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def analyse(
     feet, flags = feet_of(given, given_calibrations(calibrations), estimator)
     contacts = {name: _detector(foot, LEAST_LOAD_N).apply(foot.load) for name, foot in feet.items()}
     if not any(len(own) for own in contacts.values()) and not any(is_loaded(f, f.load, None) for f in feet.values()):
-        # Nothing of a person's weight: perhaps another unit, in which steps are steps all the same.
+        # Nothing is as heavy as a person. The loads may be in another unit; steps can be found in them all the same.
         contacts = {name: _detector(foot, 0.0).apply(foot.load) for name, foot in feet.items()}
     window = analyse_window(feet, contacts, covered, body_weight_n)
     sums = TrialSums(feet, covered.share, None if reference is None else _patterns(reference))
@@ -109,7 +109,7 @@ def analyse(
 
 
 def checked(body_weight_n: float | None, coverage: float | Coverage, estimator: str | None) -> Coverage:
-    """The coverage; raises `UsageError` for an argument out of range."""
+    """Return the coverage as a `Coverage`; raise `UsageError` for an argument out of range."""
     if body_weight_n is not None and not (math.isfinite(body_weight_n) and body_weight_n > 0.0):
         raise UsageError(f"body_weight_n is {body_weight_n:g}: give newtons above 0")
     if estimator is not None:
@@ -120,7 +120,7 @@ def checked(body_weight_n: float | None, coverage: float | Coverage, estimator: 
 
 
 def given_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> list[Calibration]:
-    """All of ``given``; the room of calibrations is imported where there are any."""
+    """Load all of ``given``. The calibration package is imported only if there is something to load."""
     if isinstance(given, Sequence) and not given:
         return []
     from smartshoe.calibration.folder import load_calibrations
@@ -129,7 +129,7 @@ def given_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> 
 
 
 def require_steps(sums: TrialSums, label: str) -> None:
-    """Raises `RefusedError` where neither a stance nor a standing load was found."""
+    """Raise `RefusedError` if neither a stance nor a standing load was found."""
     if not any(sums.contacts.values()) and not sums.was_loaded:
         raise RefusedError(
             f"{label}: no stance is found and no foot is loaded: check that the shoes were worn, and the columns' units"
@@ -142,7 +142,7 @@ def _detector(foot: Foot, least_n: float) -> ContactDetector:
 
 
 def _patterns(reference: GaitResult) -> dict[str, Array]:
-    """Each foot's pattern, where it has strides."""
+    """Return the reference pattern (`POINTS`, r) of each foot that has strides."""
     found = {}
     for name, series in reference.feet.items():
         own = [stride for stride in of_main_activity(reference.strides) if stride.foot == name]

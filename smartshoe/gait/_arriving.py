@@ -1,6 +1,6 @@
-"""A shoe's readings as they arrive: blocks of any size on to an even time base.
+"""Resamples a shoe's readings, which arrive in blocks of any size, onto an even time base.
 
-They leave in pieces of one size, cut where a recording stops.
+They come out in pieces of a fixed length; a piece is shorter only where a run of recording ends.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from smartshoe.errors import InputError, UnitError
 from smartshoe.recording import Recording
 from smartshoe.units import Unit
 
-LONGEST_HOLE_S = 10.0  # a longer one ends a run of recording; straight lines stand for shorter ones
-ON_GRID = 0.02  # of a step, by which a sample may be off the even times
+LONGEST_HOLE_S = 10.0  # a longer hole ends a run of recording; shorter ones are interpolated linearly
+ON_GRID = 0.02  # of a step: how far a sample's time may be from the even grid to be used as it is
 HOLE_STEPS = 1.5
 PIECE_S = 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Consecutive samples on the even times ``start_s + k / rate_hz``, k from ``first`` on, of one run of recording.
+    """Consecutive samples of one run of recording, at the times ``start_s + k / rate_hz`` for k from ``first`` on.
 
-    ``values`` (n, c) finite, ``missing`` (n, c) where straight lines or the last reading stand for a sample;
-    ``last`` says that the recording stops after it (for longer than `LONGEST_HOLE_S`, or for good).
+    ``values`` (n, c) are finite. ``missing`` (n, c) marks samples that were interpolated or hold the last reading.
+    ``last`` is true if the recording stops after this piece, for longer than `LONGEST_HOLE_S` or for good.
     """
 
     run: int
@@ -40,10 +40,10 @@ class Piece:
 def pieces(
     blocks: Iterable[Recording], names: tuple[str, ...], rate_hz: float, piece_s: float = PIECE_S
 ) -> Iterator[Piece]:
-    """The channels ``names`` of consecutive ``blocks`` in pieces of ``piece_s``, whatever the blocks' size.
+    """Yield the channels ``names`` of consecutive ``blocks`` in pieces of ``piece_s``, whatever the size of the blocks.
 
-    A row in which every channel is missing counts as no row. Raises `InputError` where a block lacks a channel or its
-    time does not go on, `UnitError` where its units are others.
+    A row in which every channel is missing counts as no row. Raises `InputError` if a block lacks a channel or does not
+    begin after the one before, and `UnitError` if its units differ.
     """
     size = max(1, round(piece_s * rate_hz))
     number = 0
@@ -77,6 +77,7 @@ def pieces(
 
 
 def _rows(block: Recording, names: tuple[str, ...]) -> tuple[Array, Array, Mask]:
+    """Times (n,), values (n, c) and mask of missing samples (n, c) of a block, less rows that are wholly missing."""
     lacking = [name for name in names if name not in block.channels]
     if lacking:
         raise InputError(
@@ -92,20 +93,20 @@ def _rows(block: Recording, names: tuple[str, ...]) -> tuple[Array, Array, Mask]
 
 
 class _EvenRun:
-    """One run of recording: rows go in, even rows come out once what is missing in them is bridged."""
+    """One run of recording: takes rows as they come and gives evenly spaced rows, with missing samples interpolated."""
 
     def __init__(self, number: int, start_s: float, rate_hz: float) -> None:
         self.number, self.start_s, self.rate_hz = number, start_s, rate_hz
         self.last_s = start_s
-        self._next = 0  # place of the next even row
-        self._handed_on = 0  # rows so far
-        self._end: tuple[Array, Mask] | None = None  # the last row that came
+        self._next = 0  # index of the next even row
+        self._handed_on = 0  # number of rows given out so far
+        self._end: tuple[Array, Mask] | None = None  # values and mask of the last row that was pushed
         self._values: list[Array] = []
         self._missing: list[Mask] = []
-        self._anchor: Array | None = None  # the last row handed on
+        self._anchor: Array | None = None  # the last row given out, from which interpolation starts
 
     def push(self, time_s: Array, values: Array, missing: Mask) -> None:
-        """Rows (n,), (n, c), (n, c) on to the even times up to the last of them."""
+        """Resample rows, times (n,), values (n, c) and mask (n, c), onto the even times up to the last row."""
         if self._end is not None:
             time_s = np.concatenate([[self.last_s], time_s])
             values, missing = np.vstack([self._end[0], values]), np.vstack([self._end[1], missing])
@@ -130,12 +131,12 @@ class _EvenRun:
         self._missing.append(gone)
 
     def taken(self, size: int, *, at_end: bool) -> Iterator[Piece]:
-        """The pieces of ``size`` rows that are known; at the end all that is left, the last of them marked."""
+        """Yield the complete pieces of ``size`` rows; at the end all that is left, the last piece marked."""
         wait = round(LONGEST_HOLE_S * self.rate_hz)
         values = self._values[0] if len(self._values) == 1 else np.vstack(self._values)
         missing = self._missing[0] if len(self._missing) == 1 else np.vstack(self._missing)
         while values.shape[0] >= size + wait or (at_end and values.shape[0]):
-            # Of what lies up to ``wait`` ahead a missing sample may still learn where its line goes.
+            # A missing sample is interpolated towards the next present one, which may be up to ``wait`` rows ahead.
             seen, gone = values[: size + wait], missing[: size + wait]
             if gone[:size].any():
                 seen = self._bridged(seen, gone)
@@ -148,6 +149,7 @@ class _EvenRun:
         self._values, self._missing = [values], [missing]
 
     def _bridged(self, values: Array, missing: Mask) -> Array:
+        """The values (n, c) with missing samples interpolated, also from the last row given out."""
         found = values.copy()
         at = np.arange(len(values))
         for column in np.flatnonzero(missing.any(axis=0)):
@@ -160,7 +162,7 @@ class _EvenRun:
 
 
 def joined_head(blocks: Iterator[Recording], least_s: float) -> tuple[Recording | None, list[Recording]]:
-    """The first blocks that span ``least_s``, as one recording (None where there is none) and as they came."""
+    """The first blocks, up to ``least_s``: joined as one recording (None if there is no block), and as a list."""
     came: list[Recording] = []
     for block in blocks:
         came.append(block)
@@ -172,6 +174,7 @@ def joined_head(blocks: Iterator[Recording], least_s: float) -> tuple[Recording 
 
 
 def _joined(blocks: list[Recording], end_s: float) -> Recording:
+    """One recording of several consecutive blocks, up to ``end_s``."""
     from smartshoe.recording import Channel
 
     first = blocks[0]

@@ -1,4 +1,4 @@
-"""A trial as C3D, the motion laboratories' format: loads as analog channels, gait events with their side."""
+"""Writes a trial as C3D, the motion laboratories' format: loads as analog channels, gait events with their side."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from smartshoe.gait._result import GaitResult
 
 
-# The laboratories' own names (Vicon, Visual3D, Mokka); flat and heel off have none of their own there.
+# Event labels as Vicon, Visual3D and Mokka use them; they have none for foot flat and heel off.
 LABELS = {"heel_strike": "Foot Strike", "toe_off": "Foot Off", "foot_flat": "Foot Flat", "heel_off": "Heel Off"}
 MINUTE_S = 60.0
-LONGEST = 255  # values of a parameter
-MOST = 16 * LONGEST  # events: a file's parameters hold 128 kB
-DIGITS = 3  # of the rate: beyond, two clocks' rates differ by chance
+LONGEST = 255  # values that one parameter can hold
+MOST = 16 * LONGEST  # largest number of events: a file's parameters hold 128 kB
+DIGITS = 3  # to which the rate is rounded; beyond these, two clocks' rates differ by chance
 
 
 class C3dSignal(NamedTuple):
-    """A column of the forces' table: ``values`` (n,) in ``unit``, NaN where nothing is known."""
+    """A column of the table of forces: ``values`` (n,) in ``unit``, NaN where unknown."""
 
     label: str
     unit: str
@@ -32,7 +32,7 @@ class C3dSignal(NamedTuple):
 
 
 def analog_signals(found: GaitResult) -> tuple[Array, list[C3dSignal]]:
-    """The trial's time (n,) in s and its units, feet, total and centre of pressure, as exchange formats name them."""
+    """The trial's times (n,) in s and its signals: each unit, each foot, the total force and the centre of pressure."""
     table = found.columns()
     time_s = table.pop("time_s")
     symbol = next(iter(found.feet.values())).symbol
@@ -46,11 +46,11 @@ def analog_signals(found: GaitResult) -> tuple[Array, list[C3dSignal]]:
 
 
 def write_c3d(path: Path | str, found: GaitResult) -> None:
-    """Write units, feet, total and centre of pressure as analog channels, events in the group EVENT, whole or not.
+    """Write units, feet, total and centre of pressure as analog channels, and the events in the group EVENT.
 
-    Event times count from the file's first sample, as C3D has it; TRIAL:START_S says when that was on the trial's
-    clock. Samples without a value are 0. Raises `UsageError` where the library ezc3d is not installed, and for more
-    events than the format holds.
+    Event times count from the file's first sample, as C3D requires; TRIAL:START_S gives that sample's time on the
+    trial's clock. Samples without a value are 0. The file is written completely or not at all. Raises `UsageError` if
+    the library ezc3d is not installed, and for more events than the format holds.
     """
     try:
         import ezc3d
@@ -80,9 +80,10 @@ def write_c3d(path: Path | str, found: GaitResult) -> None:
 
 
 def _add_events(made: Any, found: GaitResult, start_s: float) -> None:
+    """Add the events to ``made``, with times in minutes and seconds after ``start_s``, as C3D stores them."""
     made.add_parameter("EVENT", "USED", [len(found.events)])
     for part in range(-(-len(found.events) // LONGEST)):
-        # A parameter holds 255 values; the next ones go on as LABELS2, LABELS3, as those of points do.
+        # A parameter holds 255 values; further ones go into LABELS2, LABELS3 and so on, as for points.
         events = found.events[part * LONGEST : (part + 1) * LONGEST]
         number = str(part + 1) if part else ""
         times_s = np.array([event.time_s - start_s for event in events])

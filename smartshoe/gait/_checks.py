@@ -1,4 +1,4 @@
-"""What a trial's numbers should not be trusted for, a sentence each."""
+"""Flags that say which numbers of a trial should not be trusted, and why, in a sentence each."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from smartshoe.gait._force_sums import Forces
 
 
-LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # what a person may weigh
+LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # range of body weights
 WEIGHT_OFF = 0.05
-SILENT = 0.02  # of the foot's peak
+SILENT = 0.02  # of the foot's usual peak: a unit that reaches less bears nothing
 FAST = 1.1  # times the calibrated loading rate
 FAST_QUANTILE = 0.995
 LEAST_DRIFT_S = 10.0
-STANDING_DRIFT = 0.02  # of the total, from the first fifth of a standing to its last
+STANDING_DRIFT = 0.02  # of the mean total: largest change from the first fifth of a standing spell to its last
 
 
 def window_flags(
@@ -38,12 +38,12 @@ def window_flags(
     loaded: Mapping[str, bool],
     total: TotalForce | None,
 ) -> list[Flag]:
-    """What a window shows, those about whole shoes first."""
+    """The flags that one window gives rise to; those about whole shoes come first."""
     flags: list[Flag] = []
     if len(feet) == 1:
-        flags += _one_shoe(next(iter(feet)))
+        flags += _one_shoe_flags(next(iter(feet)))
     for name, foot in feet.items():
-        flags += _shoe(foot, series[name], loaded[name], bool(strides or spans))
+        flags += _shoe_flags(foot, series[name], loaded[name], bool(strides or spans))
     labels = label_flags(feet, series, strides)
     flags += labels
     if not labels:
@@ -57,16 +57,16 @@ def window_flags(
             )
         )
     for name, foot in feet.items():
-        flags += _units(foot, series[name])
-        flags += _gaps(foot, series[name])
+        flags += _unit_flags(foot, series[name])
+        flags += _gap_flags(foot, series[name])
     if total is not None and len(feet) > 1:
         flags += _standing_drift(total, spans)
-    return flags + _rates(feet, series)
+    return flags + _rate_flags(feet, series)
 
 
 def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: int, runs: int) -> list[Flag]:
-    """What only the whole trial shows: a body weight that cannot be, and strides of two kinds."""
-    flags = _weight(forces, coverage, given_n)
+    """The flags that need the whole trial: an implausible body weight, and strides of both walking and running."""
+    flags = _weight_flags(forces, coverage, given_n)
     if walks and runs:
         main = "running" if runs > walks else "walking"
         flags.append(
@@ -79,12 +79,12 @@ def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: i
 
 
 def plain_percent(mask: Mask) -> str:
-    """The share of True, in percent with two digits."""
+    """The share of True values, in percent with two digits, as text."""
     share = 100.0 * float(mask.mean())
     return f"{share:.0f}" if share >= 10 else f"{share:.2g}"
 
 
-def _one_shoe(foot: str) -> list[Flag]:
+def _one_shoe_flags(foot: str) -> list[Flag]:
     other = "right" if foot == "left" else "left"
     return [
         Flag(
@@ -96,7 +96,8 @@ def _one_shoe(foot: str) -> list[Flag]:
     ]
 
 
-def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Flag]:
+def _shoe_flags(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Flag]:
+    """Flags about a whole shoe: absent units, no calibration, low rate, wrong sign, no stance, no swing."""
     flags: list[Flag] = []
     absent = [region for region in REGIONS if region not in foot.regions]
     if absent:
@@ -104,7 +105,7 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
             Flag(
                 "missing_unit",
                 f"the {foot.name} shoe has no column for {', '.join(absent)}: what they bear is in no force"
-                + _late(absent),
+                + _late_events(absent),
                 foot=foot.name,
                 unit=", ".join(absent),
             )
@@ -156,12 +157,14 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
     return flags
 
 
-def _late(absent: Sequence[str]) -> str:
+def _late_events(absent: Sequence[str]) -> str:
+    """A clause on how events suffer from absent heel or toe units; '' if neither is absent."""
     affected = [says for region, says in (("heel", "heel strikes late"), ("toe", "toe offs early")) if region in absent]
     return f", {' and '.join(affected)}, and compared with a whole shoe it is no equal" if affected else ""
 
 
-def _units(foot: Foot, series: FootSeries) -> list[Flag]:
+def _unit_flags(foot: Foot, series: FootSeries) -> list[Flag]:
+    """Flags about single units: saturated, beyond the calibrated load, or without a response to steps."""
     flags: list[Flag] = []
     whole = float(series.usual_peak.sum())
     for column, (region, unit) in enumerate(zip(foot.regions, foot.units, strict=True)):
@@ -198,7 +201,8 @@ def _units(foot: Foot, series: FootSeries) -> list[Flag]:
     return flags
 
 
-def _gaps(foot: Foot, series: FootSeries) -> list[Flag]:
+def _gap_flags(foot: Foot, series: FootSeries) -> list[Flag]:
+    """Flags for missing samples, separately for long gaps within stances and all others."""
     missing = series.missing
     if not missing.any():
         return []
@@ -226,7 +230,7 @@ def _gaps(foot: Foot, series: FootSeries) -> list[Flag]:
 
 
 def _standing_drift(total: TotalForce, spans: Sequence[tuple[float, float]]) -> list[Flag]:
-    """Said where the total of standing runs away: a body that stands weighs the same at its end as at its begin."""
+    """A flag if the total force drifts while the person stands, for a standing body's weight does not change."""
     time_s, total_n = total.time_s, total.force_n
     for start_s, end_s in spans:
         first, last = np.searchsorted(time_s, [start_s + SETTLED_S, end_s - SETTLED_S])
@@ -248,7 +252,8 @@ def _standing_drift(total: TotalForce, spans: Sequence[tuple[float, float]]) -> 
     return []
 
 
-def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[Flag]:
+def _rate_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[Flag]:
+    """A flag if units are loaded faster than they were calibrated."""
     faster: list[tuple[float, float, str]] = []
     for name, foot in feet.items():
         for unit in foot.units:
@@ -268,7 +273,8 @@ def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[F
     ]
 
 
-def _weight(forces: Forces, coverage: float, given_n: float | None) -> list[Flag]:
+def _weight_flags(forces: Forces, coverage: float, given_n: float | None) -> list[Flag]:
+    """Flags for a body weight that no person has, and for one that differs from the given one."""
     flags: list[Flag] = []
     weight, mean_n = forces.body_weight, forces.mean_total_n
     found_n = mean_n if mean_n is not None else (weight.value if weight is not None else None)

@@ -1,4 +1,4 @@
-"""A foot's contacts with the ground, found block by block."""
+"""Finds a foot's contacts with the ground, block by block."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from smartshoe.gait._edges import Edges, Floors, Shapes, find_edges, floors_of
 from smartshoe.gait._swing import cut
 from smartshoe.recording import REGIONS
 
-LEAST_LOAD_N = 25.0  # what varies less is no step
+LEAST_LOAD_N = 25.0  # a load that varies less contains no step
 WINDOW_S, MARGIN_S = 20.0, 3.0
 APART_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """A foot's contacts in order of time, m of them, and the floors beside them.
+    """A foot's m contacts in order of time, and the zero level read in the swings beside them.
 
-    ``strike_s`` and ``toe_off_s`` (m,): from when to when the foot bears more than 2 % of what its units tell of body
-    weight (`smartshoe.gait._edges`), as a plate read at 10 to 20 N says; NaN where the contact began before the record
-    or lasts beyond it. ``onset_s`` and ``release_s`` (m, r): the same of each unit in ``regions``, by the same level;
-    NaN where not seen. ``floor_time_s`` (k,) and ``floor`` (k, r): what each unit reads in swing, in the loads' own
-    unit.
+    ``strike_s`` and ``toe_off_s`` (m,): from when to when the foot bears more than 2 % of body weight, as far as its
+    units measure it (`smartshoe.gait._edges`); this is close to a force plate's threshold of 10 to 20 N. NaN where the
+    contact began before the record or lasts beyond it. ``onset_s`` and ``release_s`` (m, r): the same, at the same
+    level, for each unit in ``regions``; NaN where not seen. ``floor_time_s`` (k,) and ``floor`` (k, r): what each unit
+    reads in swing, in the unit of the loads.
     """
 
     regions: tuple[str, ...]
@@ -43,17 +43,17 @@ class Contacts:
 
     @classmethod
     def joined(cls, parts: Sequence[Contacts]) -> Contacts:
-        """Several one after the other."""
+        """Concatenate contacts of consecutive parts of a signal."""
         names = ("strike_s", "toe_off_s", "onset_s", "release_s", "floor_time_s", "floor")
         return cls(parts[0].regions, *(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def of_region(self, name: str) -> int | None:
-        """The column of a region, None where the shoe has no such unit."""
+        """The column of a region; None if the shoe has no such unit."""
         return self.regions.index(name) if name in self.regions else None
 
     @property
     def foot_flat_s(self) -> Array:
-        """(m,) when the first metatarsal unit is loaded beside the heel; NaN where the heel did not come first."""
+        """(m,) times at which the first metatarsal unit is loaded after the heel; NaN where the heel is not first."""
         heel, fore = self.of_region("heel"), self._metatarsals()
         if heel is None or not fore:
             return np.full(len(self), np.nan)
@@ -63,7 +63,7 @@ class Contacts:
 
     @property
     def heel_off_s(self) -> Array:
-        """(m,) when the heel's load ends while the forefoot bears; NaN where it did not."""
+        """(m,) times at which the heel's load ends while the forefoot still bears load; NaN where it does not."""
         heel, fore = self.of_region("heel"), self._metatarsals()
         if heel is None or not fore:
             return np.full(len(self), np.nan)
@@ -76,18 +76,18 @@ class Contacts:
 
 
 def _least(values: Array) -> Array:
-    """Least (m,) of each row (m, c), NaN left out."""
+    """Minimum (m,) of each row of ``values`` (m, c), ignoring NaN; NaN for a row of NaN."""
     least = np.where(np.isfinite(values), values, np.inf).min(axis=1)
     return np.where(np.isfinite(least), least, np.nan)
 
 
 class ContactDetector:
-    """Contacts of one foot from its units' loads on an even time base, whole signals and streams alike.
+    """Finds the contacts of one foot from its units' loads on an even time base, in whole signals and in streams.
 
-    Offset, drift and body weight do not matter: thresholds are shares of the foot's own loads above its own floor
-    in swing. Loads are looked at ``window_s`` at a time with 3 s on either side, counted from the first sample,
-    so that blocks of any size give the same numbers; a contact is reported within ``window_s`` + 3 s of its end.
-    ``least_load``, in the loads' unit: what varies less is no step (0 for readings in a unit of their own).
+    Offset, drift and body weight do not matter: thresholds are shares of the foot's own loads above its own floor in
+    swing. Loads are examined ``window_s`` at a time with 3 s on either side, counted from the first sample, so that
+    blocks of any size give the same numbers; a contact is reported within ``window_s`` + 3 s of its end.
+    ``least_load``, in the loads' unit, is the smallest variation that can be a step (0 for uncalibrated readings).
     """
 
     def __init__(
@@ -109,13 +109,13 @@ class ContactDetector:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Start anew, as if nothing had been pushed."""
         self._core = max(8, round(self.window_s * self.sample_rate_hz))
         self._margin = max(4, round(MARGIN_S * self.sample_rate_hz))
         self._waiting: list[Array] = []
-        self._held = 0  # samples in hand
-        self._first = 0  # place of the first of them
-        self._done = 0  # place up to which edges were reported
+        self._held = 0  # samples held
+        self._first = 0  # index of the first sample held
+        self._done = 0  # index up to which edges have been reported
         self._last_edge = -np.inf
         self._last_floor = -np.inf
         self._rising_next: bool | None = None
@@ -126,18 +126,18 @@ class ContactDetector:
 
     @property
     def held_samples(self) -> int:
-        """How many samples wait for those after them: bounded, however long the stream."""
+        """Number of samples that wait for later ones; bounded, however long the stream."""
         return self._held
 
     def apply(self, loads: ArrayLike) -> Contacts:
-        """Contacts of a whole signal (n, r) from a fresh start; the state of `push` stays as it is."""
+        """Contacts of a whole signal (n, r). The state of a stream under way in `push` is not touched."""
         fresh = ContactDetector(
             self.sample_rate_hz, self.regions, start_s=self.start_s, least_load=self.least_load, window_s=self.window_s
         )
         return Contacts.joined([fresh.push(loads), fresh.finish()])
 
     def push(self, loads: ArrayLike) -> Contacts:
-        """The contacts that the next loads (n, r), finite, complete."""
+        """Take the next loads (n, r), which must be finite, and return the contacts that end with them."""
         block = np.asarray(loads, dtype=float)
         if block.ndim != 2 or block.shape[1] != len(self.regions):
             raise InputError(f"loads have shape {block.shape}: give one column for each of {', '.join(self.regions)}")
@@ -151,7 +151,7 @@ class ContactDetector:
         return Contacts.joined(found)
 
     def finish(self) -> Contacts:
-        """The contacts that the end of the signal completes, the last of them open where the foot is still down."""
+        """The contacts completed by the end of the signal; the last one has no toe off if the foot is still down."""
         found = [self._none()]
         end = self._first + self._held
         if end > self._done:
@@ -162,6 +162,7 @@ class ContactDetector:
         return Contacts.joined(found)
 
     def _none(self) -> Contacts:
+        """No contacts and no floors."""
         r = len(self.regions)
         return Contacts(
             self.regions, np.zeros(0), np.zeros(0), np.zeros((0, r)), np.zeros((0, r)), np.zeros(0), np.zeros((0, r))
@@ -175,7 +176,7 @@ class ContactDetector:
         )  # fmt: skip
 
     def _step(self, core_end: int) -> Contacts:
-        """Tell the edges up to the place ``core_end`` and let go of what is no longer needed."""
+        """Find the contacts up to sample ``core_end`` and drop samples that are no longer needed."""
         held = self._waiting[0] if len(self._waiting) == 1 else np.concatenate(self._waiting)
         window = held[: core_end + self._margin - self._first]
         contacts = self._found_in(window, core_end)
@@ -187,6 +188,7 @@ class ContactDetector:
         return contacts
 
     def _found_in(self, window: Array, core_end: int) -> Contacts:
+        """The contacts and floors of a window whose core ends at sample ``core_end``; updates scale and floor."""
         found = cut(window.sum(axis=1), self.sample_rate_hz, self.least_load, self._scale, self._floor)
         if found is None:
             return self._none()
@@ -205,6 +207,7 @@ class ContactDetector:
         return np.asarray(self.start_s + (np.asarray(place) + self._first) / self.sample_rate_hz)
 
     def _new_floors(self, floors: tuple[Floors, Floors], core_end: int) -> Contacts:
+        """The floors before ``core_end`` that were not reported yet."""
         place = np.column_stack([floors[0].place, floors[1].place]).ravel()
         load = np.stack([floors[0].load, floors[1].load], axis=1).reshape(-1, len(self.regions))
         new = (place + self._first > self._last_floor + 1.0) & (place + self._first < core_end)
@@ -217,6 +220,7 @@ class ContactDetector:
         )
 
     def _paired(self, edges: Edges, core_end: int) -> list[Contacts]:
+        """Pair heel strikes with toe offs before ``core_end``; edges that are too close or out of turn are dropped."""
         ended: list[Contacts] = []
         place_s, unit_s = self._time(edges.place), self._time(edges.units)
         nowhere = np.full(len(self.regions), np.nan)

@@ -1,9 +1,9 @@
-"""What passes beside the units: from the load they bear to the whole foot's.
+"""Coverage: from the load on the units to the force on the whole foot.
 
-Four coils miss the midfoot. A share alone says how much of the impulse they bear, not when. Taken as the same share at
-each moment ("even"), the whole force comes out too high where the coils bear much and too low where the midfoot does.
-A course says when: it is learned from a trial in which plates measured the whole force, or is that of the midfoot in
-walking, as published landmarks of regional loads leave it.
+Four sensing coils miss the midfoot. A share alone says how much of the impulse the coils bear, not when. If the share
+is taken to be the same at each moment ("even"), the whole force comes out too high while the coils bear much and too
+low while the midfoot does. A course over the stance says when: it is either learned from a trial in which force plates
+measured the whole force, or computed for the midfoot in walking from published landmarks of regional loads.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from smartshoe.gait._result import GaitResult
 
 
-POINTS = 101  # of a stance, 0 to 100 %
-LONGEST_STANCE_S = 2.5  # longer, the foot stands and the share is even
+POINTS = 101  # of a stance, from 0 to 100 %
+LONGEST_STANCE_S = 2.5  # in a longer stance the person stands, and the share is taken as even
 FEWEST_STANCES = 5
-# Percent of stance, and body weights beside the coils: the published whole force of walking (1.03 at 24 %, 0.68 at
-# 43 %, 1.11 at 72 %) less what heel (0.70 at 13 %, off at 48 %), meta4 (on at 26 %, 0.49 at 75 %), meta1 (0.21) and
-# toe (0.43 at 84 %) bear there, half cosines between their landmarks.
+# Percent of stance, and load beside the coils in body weights: the published whole force of walking (1.03 at 24 %, 0.68
+# at 43 %, 1.11 at 72 %) less what heel (0.70 at 13 %, off at 48 %), meta4 (on at 26 %, 0.49 at 75 %), meta1 (0.21) and
+# toe (0.43 at 84 %) bear at that time; half cosines join the landmarks.
 MIDFOOT = ((0.0, 0.0), (8.0, 0.0), (24.0, 0.47), (43.0, 0.46), (72.0, 0.05), (80.0, 0.0), (100.0, 0.0))
 HEADER = ("stance_percent", "beside_share")
 
@@ -42,9 +42,9 @@ HEADER = ("stance_percent", "beside_share")
 class Coverage:
     """The ``share`` of a foot's impulse that passes through its units, above 0 and at most 1.
 
-    ``course`` (`POINTS`) is the load beside the units at 0 to 100 % of a stance, over the mean load that the units bear
-    in that stance; None is the same share at each moment. Stances shorter than ``least_stance_s`` and standing have
-    the same share at each moment in any case.
+    ``course`` (`POINTS`) is the load beside the units at 0 to 100 % of a stance, divided by the mean load on the units
+    in that stance; None means the same share at each moment. Standing and stances shorter than ``least_stance_s``
+    always use the same share at each moment.
     """
 
     share: float = 1.0
@@ -59,7 +59,7 @@ class Coverage:
 
     @classmethod
     def midfoot(cls, share: float) -> Coverage:
-        """What passes beside the coils passes through the midfoot, as it does in walking at an ordinary speed."""
+        """Coverage of ``share`` where the rest of the load is on the midfoot, as in walking at an ordinary speed."""
         percent, beside = np.array(MIDFOOT).T
         at = np.interp(np.arange(POINTS), percent, np.arange(percent.size))
         from_ = np.minimum(at.astype(int), percent.size - 2)
@@ -69,11 +69,11 @@ class Coverage:
 
     @property
     def says(self) -> str:
-        """How the share is taken, for a person."""
+        """How the share is applied, as text for a person."""
         return "the same at each moment of a stance" if self.course is None else "by a course over the stance"
 
     def whole(self, borne: Array, time_s: Array, contacts: Contacts) -> Array:
-        """The whole force (n,) in N of a foot whose units bear ``borne`` (n,) in N."""
+        """The force (n,) in N on the whole foot, from the force ``borne`` (n,) in N on its units."""
         if self.course is None:
             return borne / self.share
         found = borne / self.share
@@ -82,7 +82,8 @@ class Coverage:
         short = lasts_s[lasts_s <= LONGEST_STANCE_S]
         usual_s = float(np.median(short)) if short.size else np.nan
         for strike_s, off_s in zip(contacts.strike_s, contacts.toe_off_s, strict=True):
-            # A stance that the record's end cuts lasts as long as the others do, unless it is seen to stand.
+            # A stance cut off by the record's start or end is taken to last as long as the others, unless it lasted
+            # longer.
             if np.isnan(strike_s) and off_s - time_s[0] <= usual_s:
                 strike_s = off_s - usual_s
             elif np.isnan(off_s) and time_s[-1] - strike_s <= usual_s:
@@ -97,7 +98,7 @@ class Coverage:
         return found
 
     def save(self, path: Path | str) -> None:
-        """Write the course as a plain table of `POINTS` rows, whole or not at all."""
+        """Write the course as a plain table of `POINTS` rows; the file is written completely or not at all."""
         rows = self.course if self.course is not None else (1.0 / self.share - 1.0,) * POINTS
         lines = [f"# coverage: {self.share!r}", f"# least_stance_s: {self.least_stance_s!r}", ",".join(HEADER)]
         lines += [f"{percent},{value!r}" for percent, value in enumerate(rows)]
@@ -105,7 +106,7 @@ class Coverage:
 
     @classmethod
     def load(cls, path: Path | str) -> Coverage:
-        """Read a course that `save` wrote; raises `InputError` naming the file and the line."""
+        """Read a course that `save` wrote; raises `InputError`, naming the file, if it is not one."""
         lines = read_text(Path(path), "a course of coverage").splitlines()
         said = dict(line[1:].split(":", 1) for line in lines if line.startswith("#") and ":" in line)
         said = {name.strip(): value for name, value in said.items()}
@@ -126,11 +127,11 @@ class Coverage:
 
 
 def learn_coverage(found: GaitResult, plate_n: Mapping[str, Array]) -> Coverage:
-    """The coverage of a trial whose whole force was measured too.
+    """Learn the coverage from a trial in which the whole force was measured too.
 
-    ``plate_n`` maps a foot to its vertical force (n,) in N on that foot's times (``found.feet[foot].time_s``): of an
-    instrumented treadmill, or of plates, with NaN where the foot was on none. Raises `InputError` where fewer than
-    five stances are whole.
+    ``plate_n`` maps a foot to its vertical force (n,) in N at that foot's times (``found.feet[foot].time_s``), from an
+    instrumented treadmill or from force plates; NaN where the foot was on none. Raises `InputError` if fewer than five
+    stances are complete.
     """
     place = np.linspace(0.0, 1.0, POINTS)
     courses, borne_s, whole_s = [], 0.0, 0.0

@@ -1,8 +1,8 @@
-"""`analyse_stream`: a trial too long for memory, a day, block by block to what `analyse` says of a short one.
+"""`analyse_stream`: analyses a trial too long for memory, such as a day, as `analyse` does a short one.
 
-The contacts are those of the same detector, fed as the blocks arrive. Once contacts and floors on both sides of a
-window of `WINDOW_S` are known, it is analysed as a short trial is, with some seconds of its neighbours in sight; its
-events and strides are handed on, its numbers are added up, and it is forgotten.
+The same detector finds contacts as the blocks arrive. Once contacts and floors on both sides of a window of `WINDOW_S`
+are known, the window is analysed as a short trial is, together with some seconds on either side. Its events and strides
+are reported, its numbers are added to running sums, and its samples are dropped.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
 
 WINDOW_S = 120.0
-HEAD_S = 60.0  # looked at before anything is reported: which columns, at what rate, of which sign
-LISTED = 2000  # strides, and the events up to the last of them, that a result lists
-PEAKS = 1000  # stances whose peaks are what is usual
+HEAD_S = 60.0  # start of the record, which shows the columns, their rate and their sign before anything is reported
+LISTED = 2000  # number of strides in a result; events are listed up to the end of the last of them
+PEAKS = 1000  # number of stances over which the usual peak is taken
 Report = Callable[[Sequence[Event], Sequence[Stride]], None]
 
 
@@ -51,13 +51,13 @@ def analyse_stream(
     report: Report | None = None,
     estimator: str | None = None,
 ) -> DayResult:
-    """The trial whose recording comes in consecutive ``blocks`` of any size, in memory that does not grow with it.
+    """Analyse the trial whose recording comes in consecutive ``blocks``, in memory that does not grow with its length.
 
-    ``blocks`` of both shoes, or a list of two iterables, one for each shoe. ``report`` is called with events and
-    strides in order as they are known, some minutes after they happened; the other arguments are those of `analyse`,
-    with whose result this one agrees whatever the blocks' size. Recording that stops for more than 10 s ends what is
-    under way, and the analysis goes on after it. What an ``estimator`` must know of a reading's noise and of how fast
-    loads change is that of the first minute. Raises what `analyse` raises.
+    ``blocks`` are recordings of both shoes, of any size, or a list of two iterables, one for each shoe. ``report`` is
+    called with events and strides in order as they become known, some minutes after they happened. The other arguments
+    are those of `analyse`, and the result agrees with that of `analyse` whatever the size of the blocks. A stop of the
+    recording for more than 10 s ends the contact under way; the analysis goes on after it. An ``estimator`` takes the
+    reading's noise and the load's rate of change from the first minute. Raises what `analyse` raises.
     """
     covered = checked(body_weight_n, coverage, estimator)
     sources = _sources(_several(blocks))
@@ -68,13 +68,14 @@ def analyse_stream(
 
 
 def _several(blocks: Iterable[Recording] | Sequence[Iterable[Recording]]) -> list[Iterable[Recording]]:
-    """One iterable for each source; a sequence of recordings is one source."""
+    """One iterable of blocks for each source; a sequence of recordings is a single source."""
     if isinstance(blocks, (list, tuple)) and not any(isinstance(item, Recording) for item in blocks):
         return list(blocks)
     return [cast("Iterable[Recording]", blocks)]
 
 
 def _sources(given: Sequence[Iterable[Recording]]) -> list[tuple[Recording, Iterator[Recording]]]:
+    """Each source's label and channels, as the recording of its first `HEAD_S`, and all its blocks."""
     found: list[tuple[Recording, Iterator[Recording]]] = []
     for blocks in given:
         rest = iter(blocks)
@@ -86,6 +87,8 @@ def _sources(given: Sequence[Iterable[Recording]]) -> list[tuple[Recording, Iter
 
 
 class _Day:
+    """The analysis of a long trial under way: one stream for each foot, running sums, and the first strides."""
+
     def __init__(
         self,
         feet: Mapping[str, Foot],
@@ -119,18 +122,21 @@ class _Day:
         self._peaks: dict[str, deque[Array]] = {name: deque(maxlen=PEAKS) for name in feet}
         self._streams: dict[str, FootStream] = {}
         self._settled_s = self._run_s = 0.0
-        self._events: list[Event] = []  # waiting for their window
+        self._events: list[Event] = []  # waiting until their window is analysed
         self._listed_events: list[Event] = []
         self._listed: list[Stride] = []
         self.event_count = self.stride_count = 0
 
     def run(self) -> None:
-        """Through all of it, one run of recording after the other; a shoe's that ends, ends the other's too."""
+        """Analyse all pieces, one run of recording after the other.
+
+        A run ends for both shoes when one of them stops.
+        """
         ahead = dict(enumerate(next(own, None) for own in self._pieces))
         while running := {k: piece for k, piece in ahead.items() if piece is not None}:
             begin_s = max(self._at(k, piece) for k, piece in running.items())
             for k in running:
-                # Two shoes are looked at together: what one recorded while the other did not yet is passed over.
+                # Both shoes are analysed together: what one recorded before the other began is skipped.
                 while (late := ahead[k]) and self._at(k, late) + len(late.values) / self._rate(k) <= begin_s:
                     ahead[k] = next(self._pieces[k], None)
             running = {k: piece for k, piece in ahead.items() if piece is not None}
@@ -157,6 +163,7 @@ class _Day:
         return piece.start_s + piece.first / self._rate(source)
 
     def _begin(self, running: Mapping[int, Piece]) -> None:
+        """Start a run of recording with new streams."""
         self._settled_s = min(self._at(k, piece) for k, piece in running.items())
         self._streams = {
             name: FootStream(self.feet[name], self._channels[name], self._at(k, piece))
@@ -182,6 +189,7 @@ class _Day:
         self._settle(at_end=True)
 
     def _settle(self, *, at_end: bool) -> None:
+        """Analyse all windows whose contacts and floors are known."""
         while self._streams:
             end_s = self._settled_s + WINDOW_S
             last_s = max(stream.end_s for stream in self._streams.values())
@@ -194,6 +202,7 @@ class _Day:
                 self._streams = {}
 
     def _settle_to(self, end_s: float) -> None:
+        """Analyse the window up to ``end_s``, report its events and strides, and drop its samples."""
         windows = {name: stream.window(self._settled_s, end_s) for name, stream in self._streams.items()}
         windows = {name: windows[name] for name in self.feet if name in windows and windows[name][0].time_s.size > 1}
         strides: tuple[Stride, ...] = ()
@@ -228,7 +237,7 @@ class _Day:
         self._listed_events = [event for event in self._listed_events if event.time_s <= until_s]
 
     def result(self, flags: Sequence[Flag]) -> DayResult:
-        """What it all comes to; raises `RefusedError` where neither a stance nor a standing load was found."""
+        """The result of the whole trial; raises `RefusedError` if neither a stance nor a standing load was found."""
         sums = self.sums
         require_steps(sums, self.label)
         is_cut = self.stride_count > len(self._listed)
@@ -253,5 +262,6 @@ class _Day:
 
 
 def _channels_of(foot: Foot, head: Recording) -> tuple[Channel, ...] | None:
+    """The channels of a foot's units in a recording; None if one is not there."""
     found = [head.channels.get(u.name) or head.channels.get(u.name.split("_", 1)[-1]) for u in foot.units]
     return tuple(c for c in found if c is not None) if all(c is not None for c in found) else None

@@ -1,4 +1,4 @@
-"""What should not be trusted of a day: flags of its windows, each once, and where its recording stops."""
+"""Flags of a long trial: those of its windows, each once, and where the recording stops."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from smartshoe.gait._flag import Flag, where_text
 from smartshoe.gait._trial_sums import TrialSums
 from smartshoe.gait._window import AnalysisWindow
 
-# Each window has them alike, so the whole has them as they stand.
+# Flags that every window raises alike; they hold for the whole trial unchanged.
 STEADY = frozenset({"one_shoe", "missing_unit", "uncalibrated", "low_rate", "negative_load", "no_stance", "no_swing",
                     "too_short"})  # fmt: skip
-# What two minutes may show by chance: given where most windows with strides show it.
+# Flags that two minutes may show by chance: reported if most windows with strides show them.
 MOSTLY_SHOWN = frozenset({"left_right_swapped", "metatarsals_swapped", "sequence_broken", "clocks_apart",
                           "clock_rates_differ"})  # fmt: skip
-LEAST_STOP_S = 1.0  # two shoes' files end some samples apart
+LEAST_STOP_S = 1.0  # shorter stops are ignored: two shoes' files end some samples apart
 LISTED_STOPS = 3
 
 Key = tuple[str, str | None, str | None]
 
 
 class DayFlags:
-    """The flags of a trial's windows, and the runs of its recording."""
+    """Collects the flags of a trial's windows and the runs of its recording."""
 
     def __init__(self) -> None:
         self._first: dict[Key, tuple[Flag, AnalysisWindow]] = {}
@@ -37,11 +37,11 @@ class DayFlags:
 
     @property
     def duration_s(self) -> float:
-        """From the first sample to the last."""
+        """Time in s from the first sample to the last."""
         return 0.0 if self._begin_s is None else self._end_s - self._begin_s
 
     def add_run(self, start_s: float, end_s: float) -> None:
-        """A run of recording, from its first sample to its last."""
+        """Add a run of recording by the times of its first and last sample."""
         if self._begin_s is None:
             self._begin_s = start_s
         elif start_s - self._end_s > LEAST_STOP_S:
@@ -53,7 +53,7 @@ class DayFlags:
         self.recorded_s += end_s - start_s
 
     def add(self, window: AnalysisWindow) -> None:
-        """One more window."""
+        """Add the flags of one more window."""
         self._windows += 1
         self._stepping += bool(window.strides)
         shown: dict[Key, Flag] = {}
@@ -65,7 +65,7 @@ class DayFlags:
             self._ends_s[key] = min(window.end_s, float(next(iter(window.feet.values())).time_s[-1]))
 
     def flags(self, sums: TrialSums) -> list[Flag]:
-        """All of them, in the order in which they were first seen."""
+        """The flags of the whole trial, in the order in which they were first seen."""
         found = [flag for key in self._first if (flag := self._of_day(key, sums)) is not None]
         if self._stop_count:
             often = "once" if self._stop_count == 1 else f"{self._stop_count} times"
@@ -79,6 +79,7 @@ class DayFlags:
         return found
 
     def _of_day(self, key: Key, sums: TrialSums) -> Flag | None:
+        """A window's flag restated for the whole trial; None if it does not hold for the trial."""
         flag, window = self._first[key]
         count = self._counts[key]
         if flag.kind in STEADY:

@@ -1,4 +1,4 @@
-"""Edges of contact in a window of a foot's loads: heel strikes and toe offs, and when each unit comes and goes."""
+"""Edges of contact in a window of a foot's loads: heel strikes, toe offs, and the onset and release of each unit."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.gait._crossing import USUAL_POWER, bent_places, growth, level_places, rise_places, running_median
 from smartshoe.gait._swing import Cut
 
-BEARS = 0.02  # of body weight: a foot, or a unit, bears from there on, as plates are read at 10 to 20 N
-UNIT_LEVEL = 0.06  # a unit's lowest level, of its own median peak
-MOST_LEVEL = 0.12  # the lowest level at most, of the median peak
-LONGEST_SWING_S = 1.0  # longer, the foot rests, and its mean load tells no body weight
+BEARS = 0.02  # of body weight: above it a foot or a unit bears load; force plates are read at 10 to 20 N
+UNIT_LEVEL = 0.06  # of a unit's own median peak: its lowest level
+MOST_LEVEL = 0.12  # of the median peak: upper limit of the lowest level
+LONGEST_SWING_S = 1.0  # in a longer swing the foot rests, and its mean load does not measure body weight
 WALKING_STANCE_S = 0.4  # a runner's is shorter
 RUNNING_PEAK = 2.5  # body weights; Munro et al. 1987 (J. Biomech. 20, 147-155): 2.5 at 3 m/s, 2.8 at 5 m/s
-TOP = 5.0  # times the lowest level: where a load has come for certain
+TOP = 5.0  # times the lowest level: above it the foot is certainly loaded
 NOISES = 5.0
 BEFORE_S, AFTER_S = 0.15, 0.15
 UNIT_BEFORE_S, UNIT_AFTER_S = 0.08, 1.2
-PEAKS = 5  # contacts, over whose median peak a level is set
-EARLY, LATE = (0.2, 0.5), (0.5, 0.85)  # of a swing (its first or last second at most): where its floor is taken
+PEAKS = 5  # number of contacts over whose median peak a level is set
+EARLY, LATE = (0.2, 0.5), (0.5, 0.85)  # of a swing (its first or last second at most): where its floor is read
 LONGEST_FLOOR_S = 1.0
-TINY = 1e-6  # of a sample: rounding of the rate
+TINY = 1e-6  # of a sample: tolerance for the rounding of the rate
 
 
 @dataclass(frozen=True, eq=False)
 class Floors:
-    """Loads (k, r) read in swings at places (k,) in samples: what no load reads, as it drifts."""
+    """Mean loads (k, r) read in swings centred at ``place`` (k,) in samples: the drifting zero of each unit."""
 
     place: Array
     load: Array
@@ -36,9 +36,9 @@ class Floors:
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Ends of contact in order: coarse and exact place (k,) in samples, each unit's onset or release (k, r).
+    """Starts and ends of contact in order: approximate and exact place (k,) in samples, each unit's place (k, r).
 
-    ``rises`` (k,) is True for a heel strike, False for a toe off. ``scale`` is the median peak over the floor.
+    ``rises`` (k,) is True for a heel strike, False for a toe off. ``scale`` is the median peak above the floor.
     """
 
     coarse: Index
@@ -50,14 +50,14 @@ class Edges:
 
 @dataclass
 class Shapes:
-    """How onsets and releases grow (`smartshoe.gait._crossing.growth`), as last seen: of the foot, of its units."""
+    """Last known growth (`smartshoe.gait._crossing.growth`) of onsets and releases: of the foot, and of each unit."""
 
     foot: list[float]
     units: list[list[float]]
 
     @classmethod
     def usual(cls, regions: int) -> Shapes:
-        """Before anything was seen."""
+        """The shapes assumed before any contact was seen."""
         start = 2.0 ** (1.0 / USUAL_POWER)
         return cls([start, start], [[start] * regions, [start] * regions])
 
@@ -82,12 +82,12 @@ def floors_of(loads: Array, found: Cut, rate_hz: float) -> tuple[Floors, Floors]
 
 
 def _filled(values: Array, other: Array) -> Array:
-    """``values`` (k, r), where NaN those of ``other`` (k, r)."""
+    """``values`` (k, r), with NaN replaced by those of ``other`` (k, r)."""
     return np.where(np.isfinite(values), values, other)
 
 
 def find_edges(loads: Array, found: Cut, floors: tuple[Floors, Floors], rate_hz: float, shapes: Shapes) -> Edges:
-    """The edges of all contacts in a window of loads (n, r); ``shapes`` are renewed by what is seen."""
+    """The edges of all contacts in a window of loads (n, r). Updates ``shapes``."""
     size = loads.shape[0]
     early, late = _filled(floors[0].load, floors[1].load), _filled(floors[1].load, floors[0].load)
     inner_start, inner_stop = found.start > 0, found.stop < size
@@ -127,10 +127,11 @@ def find_edges(loads: Array, found: Cut, floors: tuple[Floors, Floors], rate_hz:
 
 @dataclass(frozen=True, eq=False)
 class _Ends:
-    """One end of k contacts.
+    """The starts, or the ends, of k contacts.
 
-    Its coarse place ``at`` and the contact's ``length`` (k,) in samples, the floor ``base`` (k, r) of the swing beside
-    it, what the foot ``bears`` (k,) from there on, and the usual peak of the foot (k,) and of its units (k, r).
+    ``at`` is the approximate place and ``length`` that of the contact, both (k,) in samples; ``base`` (k, r) is the
+    floor of the swing next to it, ``bears`` (k,) the level above which the foot bears load, ``usual_whole`` (k,) and
+    ``usual`` (k, r) the usual peaks of the foot and of its units.
     """
 
     at: Index
@@ -142,11 +143,12 @@ class _Ends:
 
 
 def _body_weights(begins: Index, ends: Index, impulses: Array, peaks: Array, rate_hz: float) -> Array:
-    """Body weight (k,) in the loads' unit, from the foot's own loads, about each contact [``begins``, ``ends``).
+    """Body weight (k,) in the loads' unit near each contact [``begins``, ``ends``), from the foot's own loads.
 
-    Over whole strides a foot carries half of it: twice the impulse (k,), NaN of a contact that is cut off, over the
-    time from contact to contact. A contact between rests has no stride: there it is the usual peak (k,) of a foot that
-    walks, and less by `RUNNING_PEAK` of one that runs. (A share of the peak alone would be met later by the runner.)
+    Over whole strides a foot carries half of the body weight, so the weight is twice the impulse (k,), NaN for a
+    contact that is cut off, divided by the time from contact to contact. A contact between rests has no stride: there
+    the weight is the usual peak (k,) of a walking foot, or the peak of a running foot divided by `RUNNING_PEAK`. (A
+    threshold at a share of the peak alone would be reached later by a runner.)
     """
     swings = np.where(begins[1:] - ends[:-1] <= LONGEST_SWING_S * rate_hz, begins[1:] - ends[:-1], np.inf)
     swings = np.minimum(np.append(swings, np.inf), np.append(np.inf, swings))
@@ -160,7 +162,10 @@ def _body_weights(begins: Index, ends: Index, impulses: Array, peaks: Array, rat
 def _located(
     loads: Array, ends: _Ends, noise: float, rate_hz: float, shapes: Shapes, side: int
 ) -> tuple[Index, Array, Array]:
-    """Rises (``side`` 0) or falls (1): coarse places (k,), exact places (k,), units' places (k, r)."""
+    """Locate rises (``side`` 0) or falls (1).
+
+    Returns approximate places (k,), exact places (k,) and the places of the units (k, r), all in samples.
+    """
     at, base, bears = ends.at, ends.base, ends.bears
     count, regions = at.size, loads.shape[1]
     units = np.full((count, regions), np.nan)
@@ -171,7 +176,7 @@ def _located(
     first = at - turn * round(BEFORE_S * rate_hz) - (0 if side == 0 else 1)
     width = round((BEFORE_S + AFTER_S) * rate_hz) + 1
     rows = _rows(loads.sum(axis=1), first, turn, width) - base.sum(axis=1)[:, None]
-    # The level itself where noise allows: the way down to it from a higher one is then no guess.
+    # Where noise allows, the first level is the wanted one itself, and nothing is extrapolated.
     levels, top = _levels(bears, ends.usual_whole, noise)
     places = rise_places(rows, levels, top)
     shapes.foot[side] = growth(_resolved(rows, places[:, 0], bears, ends.usual_whole, noise), shapes.foot[side])
@@ -179,7 +184,7 @@ def _located(
     lowest = bent_places(rows, levels[:, 0], places[:, 0], ratio)
     met = lowest - places[:, 0] + level_places(places, ratio, bears / np.maximum(levels[:, 0], 1e-12))
     place = np.where(np.isfinite(met), first + turn * met, at.astype(float))
-    # A unit comes and goes while the foot is down; beyond the contact's other end it is another stance's.
+    # A unit is loaded only while the foot is down; beyond the contact's other end its load is another stance's.
     first = at - turn * round(UNIT_BEFORE_S * rate_hz) - (0 if side == 0 else 1)
     margin = round(UNIT_BEFORE_S * rate_hz)
     reach = np.minimum(ends.length + 2 * margin, margin + round(UNIT_AFTER_S * rate_hz))
@@ -198,19 +203,19 @@ def _located(
 
 
 def _resolved(rows: Array, lowest: Array, bears: Array, usual: Array, noise: float) -> Array:
-    """Where (k, 3) rows cross doubling levels that lie samples apart, so that their ratio tells the growth."""
+    """Where (k, 3) rows cross doubling levels that lie samples apart, so that the growth can be read from them."""
     next_place = np.minimum(np.floor(np.nan_to_num(lowest)).astype(np.intp) + 1, rows.shape[1] - 1)
     step = float(np.median(rows[np.arange(len(rows)), next_place]))
     return rise_places(rows, *_levels(np.maximum(bears, np.minimum(step, MOST_LEVEL * usual)), usual, noise))
 
 
 def _levels(least: Array, usual: Array, noise: float) -> tuple[Array, Array]:
-    """Three doubling levels (k, 3), the lowest ``least`` (k,) or above the noise, and the top (k,)."""
+    """Three doubling levels (k, 3), the lowest ``least`` (k,) or above the noise, and the top level (k,)."""
     lowest = np.clip(NOISES * noise, least, np.maximum(MOST_LEVEL * usual, least))
     return lowest[:, None] * np.array([1.0, 2.0, 4.0]), TOP * lowest
 
 
 def _rows(signal: Array, first: Index, turn: int, width: int) -> Array:
-    """Segments (k, width) of the signal from ``first`` on, forwards or backwards; its end values beyond its ends."""
+    """Segments (k, width) of the signal from ``first`` on, forwards (``turn`` 1) or backwards (-1), end values held."""
     index = first[:, None] + turn * np.arange(width)[None, :]
     return np.asarray(signal[np.clip(index, 0, signal.size - 1)])

@@ -1,6 +1,6 @@
-"""From a unit's reading to its load: the one seam by which forces come into a trial.
+"""From a unit's reading to its load: the one place where forces enter a trial.
 
-Behind `estimate` stands the calibration's own compensator, or an estimator of `smartshoe.calibration.estimators`.
+`estimate` uses the calibration's own compensator or an estimator of `smartshoe.calibration.estimators`.
 """
 
 from __future__ import annotations
@@ -21,28 +21,31 @@ if TYPE_CHECKING:
     from smartshoe.calibration.estimators import ForceEstimate, ForceRun
 
 
-BEYOND = 1.02  # times the largest calibrated load: noise at its edge is no extrapolation
-RAIL_RUN, RAIL_LONG = 4, 100  # ties in a row; so many that no hump is as flat
+BEYOND = 1.02  # times the largest calibrated load: noise at the limit does not count as extrapolation
+RAIL_RUN, RAIL_LONG = 4, 100  # equal samples in a row; no peak of a load is flat for as long as RAIL_LONG
 MOST_TIED = 0.5
-RAIL_STEEP = 4.0  # resolutions, by which a load still rises as it meets the rail
+RAIL_STEEP = 4.0  # in resolutions: how much a load still rises in the sample before it reaches its rail
 
 
 class LoadRun:
-    """A unit's readings, in its channel's unit and finite, to its load and the load's error bar, piece after piece.
+    """Converts a unit's readings, finite and in its channel's unit, to load with an error bar, piece after piece.
 
-    ``gain_sd`` is the sd of the calibration's static gain as a share.
+    ``gain_sd`` is the standard deviation of the calibration's static gain, as a share.
     """
 
     def __init__(self, to_load: Callable[[Array], Array], run: ForceRun | None = None, gain_sd: float = 0.0) -> None:
         self._to_load, self._run, self.gain_sd = to_load, run, gain_sd
 
     def push(self, readings: Array, missing: Mask) -> tuple[Array, Array | None]:
-        """The loads (n,) that the next readings make known; with an estimator also their error bars (n,)."""
+        """Take the next readings and their mask (n,); return the loads now known, and with an estimator their sd.
+
+        An estimator may return fewer or more loads than readings, since it may wait for later readings.
+        """
         values = self._to_load(readings)
         return (values, None) if self._run is None else self._both(self._run.push(values, missing))
 
     def finish(self) -> tuple[Array, Array | None]:
-        """The loads that the end of the readings makes known."""
+        """Return the remaining loads, and their sd with an estimator, once there are no more readings."""
         return (np.zeros(0), None) if self._run is None else self._both(self._run.finish())
 
     def _both(self, found: ForceEstimate) -> tuple[Array, Array]:
@@ -51,13 +54,13 @@ class LoadRun:
 
 @dataclass(frozen=True, eq=False)
 class UnitLoad:
-    """A unit's load (n,): in N where ``is_force``, else in the reading's own unit ``symbol``.
+    """A unit's load (n,), in N if ``is_force``, otherwise in the reading's own unit ``symbol``.
 
-    ``missing``, ``saturated`` and ``beyond`` (n,): no sample, a reading on its rail, a load beyond the calibration.
-    ``sd_n`` (n,) is the estimator's error bar, None without one. ``gain_sd`` is the sd of the calibration's static gain
-    as a share, 0 where it is not known. ``range_n`` and ``rate_n_per_s`` are the largest load and loading rate that the
-    calibration saw, None where it does not say. ``begin`` is a fresh run from readings to load, for a stream; what an
-    estimator must know of noise is that of these readings.
+    ``missing``, ``saturated`` and ``beyond`` (n,) mark missing samples, readings on the rail and loads beyond the
+    calibrated range. ``sd_n`` (n,) is the estimator's error bar, None without one. ``gain_sd`` is the standard
+    deviation of the calibration's static gain as a share, 0 if unknown. ``range_n`` and ``rate_n_per_s`` are the
+    largest load and loading rate in the calibration, None if unknown. ``begin`` starts a new conversion for a stream;
+    an estimator takes the noise from the readings given here.
     """
 
     name: str
@@ -77,16 +80,16 @@ class UnitLoad:
 def estimate(
     name: str, channel: Channel, rate_hz: float, calibration: Calibration | None, estimator: str | None = None
 ) -> UnitLoad:
-    """The load of unit ``name`` from its ``channel`` (n,) on an even time base of ``rate_hz``.
+    """The load of unit ``name`` from its ``channel`` (n,), sampled evenly at ``rate_hz``.
 
-    A channel in a unit of force is the load already. ``estimator`` is a name of `smartshoe.calibration.estimators`,
-    None the calibration's own compensator. Raises `UnitError` where the calibration is for another quantity.
+    A channel in a unit of force is the load already. ``estimator`` is a name of `smartshoe.calibration.estimators`;
+    None means the calibration's own compensator. Raises `UnitError` if the calibration is for another quantity.
     """
     present = channel.present
     readings, missing = bridged(np.arange(present.size, dtype=float), channel.values, present), ~present
     nothing = np.zeros(present.size, dtype=bool)
     is_force = channel.unit.quantity == "force"
-    begin = _way(name, channel, rate_hz, None if is_force else calibration, estimator, readings)
+    begin = _conversion(name, channel, rate_hz, None if is_force else calibration, estimator, readings)
     run = begin()
     (load, sd_n), (rest, rest_sd_n) = run.push(readings, missing), run.finish()
     if rest.size:
@@ -103,7 +106,7 @@ def estimate(
     return replace(found, beyond=load > BEYOND * largest if largest else nothing, range_n=largest, rate_n_per_s=rate)
 
 
-def _way(
+def _conversion(
     name: str,
     channel: Channel,
     rate_hz: float,
@@ -111,7 +114,7 @@ def _way(
     estimator: str | None,
     readings: Array,
 ) -> Callable[[], LoadRun]:
-    """How a fresh run from readings to load is begun."""
+    """Return a function that starts a new conversion from readings to load."""
     if calibration is None:
         return lambda: LoadRun(channel.unit.to_si if channel.unit.quantity == "force" else np.asarray)
     unit = calibration.reading_unit
@@ -140,9 +143,9 @@ def _way(
 
 
 def on_the_rail(channel: Channel) -> Mask:
-    """Samples (n,) tied at the largest reading, or at the instrument's upper limit, while the load was still rising.
+    """Samples (n,) equal to the largest reading, or to the instrument's upper limit, reached while the load still rose.
 
-    A hump that is flat for some samples rises softly into its top; a reading that meets its rail does not.
+    A peak that is flat for some samples rises softly to its top; a reading that hits its rail does not.
     """
     values, present = channel.values, channel.present
     if values.size < RAIL_RUN + 2:
@@ -152,7 +155,7 @@ def on_the_rail(channel: Channel) -> Mask:
         top = channel.range_[1]
     tied = (values >= top) & present
     if np.count_nonzero(tied) > MOST_TIED * values.size:
-        return np.zeros(values.size, dtype=bool)  # a channel that stands still says nothing of its rail
+        return np.zeros(values.size, dtype=bool)  # a channel that never changes does not show where its rail is
     start, stop = runs_of(tied)
     long = (stop - start) >= RAIL_RUN
     start, stop = start[long], stop[long]
@@ -171,5 +174,5 @@ def on_the_rail(channel: Channel) -> Mask:
 
 
 def calibration_of(calibrations: Mapping[str, Calibration], name: str) -> Calibration | None:
-    """The calibration of unit ``name``: by its full name, or by its region where the calibration names no side."""
+    """The calibration of unit ``name``: by its full name, or by its region if the calibration names no side."""
     return calibrations.get(name) or calibrations.get(name.split("_", 1)[-1])

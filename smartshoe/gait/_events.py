@@ -1,4 +1,4 @@
-"""Gait events: what a foot's contacts say happened, and when."""
+"""Gait events: heel strike, foot flat, heel off and toe off, listed from a foot's contacts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from smartshoe.gait._contact import Contacts
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A gait event of one foot: heel_strike, foot_flat, heel_off or toe_off."""
+    """A gait event of one foot: ``event`` is heel_strike, foot_flat, heel_off or toe_off."""
 
     time_s: float
     foot: str

@@ -1,4 +1,4 @@
-"""What a person should know before trusting a number: one sentence, and where."""
+"""`Flag`: what a person should know before trusting a number, in one sentence, with the times it concerns."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.signals.masks import runs_of
 
 MOST_SPANS = 3
-JOINED_S = 0.5  # spans less than that apart are one
+JOINED_S = 0.5  # spans that are less than this apart are joined
 
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """``kind`` is the word that scripts rely on; ``foot`` and ``unit`` None where it concerns no one in particular."""
+    """A warning. ``kind`` is a fixed word for scripts; ``foot`` and ``unit`` are None if it concerns no single one."""
 
     kind: str
     says: str
@@ -24,12 +24,12 @@ class Flag:
     where: str = "all"
 
     def to_dict(self) -> dict[str, Any]:
-        """The contract's form."""
+        """The flag as an object for JSON."""
         return {"kind": self.kind, "foot": self.foot, "unit": self.unit, "where": self.where, "says": self.says}
 
 
 def spans_of(time_s: Array, mask: Mask) -> list[tuple[float, float]]:
-    """Begin and end in s of the runs of True, those less than `JOINED_S` apart as one."""
+    """Begin and end in s of each run of True in ``mask`` (n,); runs less than `JOINED_S` apart are joined."""
     first, after = runs_of(mask)
     spans: list[tuple[float, float]] = []
     for start, stop in zip(time_s[first], time_s[after - 1], strict=True):
@@ -41,7 +41,7 @@ def spans_of(time_s: Array, mask: Mask) -> list[tuple[float, float]]:
 
 
 def where_text(spans: Sequence[tuple[float, float]]) -> str:
-    """The first few time spans as text; "and 12 more, to 118.2 s" for the rest."""
+    """The first few time spans as text, with "and 12 more, to 118.2 s" for the rest."""
     said = ", ".join(f"{start:.1f}-{stop:.1f} s" for start, stop in spans[:MOST_SPANS])
     more = len(spans) - MOST_SPANS
     return said if more <= 0 else f"{said} and {more} more, to {spans[-1][1]:.1f} s"

@@ -1,4 +1,4 @@
-"""One foot of a long trial: readings in pieces, loads and contacts out, held no longer than they are needed."""
+"""One foot of a long trial: takes readings in pieces, gives loads and contacts, and keeps them only while needed."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from smartshoe.gait._estimate import BEYOND, UnitLoad, on_the_rail
 from smartshoe.gait._trial import Foot
 from smartshoe.recording import Channel
 
-BACK_S, AHEAD_S = 8.0, 8.0  # beside a window: two of the longest strides
-HORIZON_S = 600.0  # so long a load waits for the next swing to tell its zero
+BACK_S, AHEAD_S = 8.0, 8.0  # on either side of a window: two of the longest strides
+HORIZON_S = 600.0  # longest time for which a load waits for the next swing to give its zero
 
 
 class Detector(ContactDetector):
-    """A detector that also says how far it has come."""
+    """A contact detector that also says up to when it has reported all contacts."""
 
     @property
     def known_s(self) -> float:
-        """Up to when all that ended is reported."""
+        """Time in s before which every contact that ended has been reported."""
         return self.start_s + self._done / self.sample_rate_hz
 
     @property
     def under_way(self) -> Contacts:
-        """The contact that has begun and not ended, with NaN for its toe off; empty where there is none."""
+        """The contact that has begun and not ended, with NaN as its toe off; empty if there is none."""
         if self._open is None:
             return self._none()
         return self._contact(*self._open, np.nan, np.full(len(self.regions), np.nan))
 
 
 class FootStream:
-    """One foot's run of recording.
+    """One run of recording of one foot.
 
-    ``model`` is the foot as a first look at the record has it, ``channels`` its units' channels there (for unit and
-    range); readings without a calibration are loads in a unit of their own. A load may be known some time after its
-    reading: an estimator may wait for what comes after.
+    ``model`` is the foot as found at the start of the record, ``channels`` are its units' channels there (for their
+    unit and range). Readings without a calibration are loads in a unit of their own. A load may become known some time
+    after its reading, since an estimator may wait for later readings.
     """
 
     def __init__(self, model: Foot, channels: tuple[Channel, ...], start_s: float) -> None:
@@ -49,9 +49,9 @@ class FootStream:
         )
         self._turn = -1.0 if model.turned else 1.0
         self._runs = [unit.begin() for unit in model.units]
-        self._waiting = [np.zeros(0)] * len(model.units)  # loads that not every unit has come to know
+        self._waiting = [np.zeros(0)] * len(model.units)  # loads of each unit that are not yet known for every unit
         width = len(model.units)
-        self._first = 0  # place of the first sample in hand
+        self._first = 0  # index of the first sample held
         self._readings, self._load = np.zeros((0, width)), np.zeros((0, width))
         self._missing = np.zeros((0, width), dtype=bool)
         self._contacts = self.detector._none()
@@ -59,7 +59,7 @@ class FootStream:
         self._is_over = False
 
     def push(self, readings: Array, missing: Mask) -> Contacts:
-        """The contacts that the next readings (n, r), in the channels' units, complete."""
+        """Take the next readings (n, r), in the channels' units; return the contacts that end with them."""
         new = [
             run.push(np.ascontiguousarray(column), gone)[0]
             for run, column, gone in zip(self._runs, readings.T, missing.T, strict=True)
@@ -68,7 +68,7 @@ class FootStream:
         return self._joined(self.detector.push(self._known(new)))
 
     def _known(self, new: Sequence[Array]) -> Array:
-        """The loads (n, r) that every unit has come to know with its ``new`` ones."""
+        """The loads (n, r) that are now known for every unit, after the ``new`` ones of each."""
         loads = [np.concatenate(pair) for pair in zip(self._waiting, new, strict=True)]
         count = min(load.size for load in loads)
         self._waiting = [load[count:] for load in loads]
@@ -80,7 +80,7 @@ class FootStream:
         return known
 
     def finish(self) -> Contacts:
-        """The contacts that the end of the run completes."""
+        """Return the contacts that are completed by the end of the run."""
         self._is_over = True
         last = self.detector.push(self._known([run.finish()[0] for run in self._runs]))
         return self._joined(Contacts.joined([last, self.detector.finish()]))
@@ -91,11 +91,11 @@ class FootStream:
 
     @property
     def end_s(self) -> float:
-        """One step beyond the last sample in hand."""
+        """Time in s of the sample after the last one held."""
         return self.start_s + (self._first + len(self._load)) / self.rate_hz
 
     def settled_s(self) -> float:
-        """Up to when contacts, and the floors on either side, are known for good."""
+        """Time in s up to which contacts, and the floors on either side of it, will no longer change."""
         if self._is_over:
             return np.inf
         known_s = self.detector.known_s - AHEAD_S
@@ -104,7 +104,7 @@ class FootStream:
         return known_s if known_s - last_s > HORIZON_S else min(known_s, last_s)
 
     def _hold_floor(self, until_s: float) -> None:
-        """Where no swing was seen for long, the last floor is that of ``until_s`` too: what was reported stays true."""
+        """After a long time without a swing, repeat the last floor at ``until_s``: what was reported stays valid."""
         floor_s, floor = self._contacts.floor_time_s, self._contacts.floor
         if not self._is_over and floor_s.size and until_s > floor_s[-1]:
             self._contacts = replace(
@@ -114,7 +114,7 @@ class FootStream:
             )
 
     def window(self, start_s: float, end_s: float) -> tuple[Foot, Contacts]:
-        """The foot from `BACK_S` before ``start_s`` to `AHEAD_S` after ``end_s``, and its contacts and floors there."""
+        """The foot from `BACK_S` before ``start_s`` to `AHEAD_S` after ``end_s``, with its contacts and floors."""
         first, stop = self._places(start_s - BACK_S, end_s + AHEAD_S)
         time_s = self.start_s + np.arange(self._first + first, self._first + stop) / self.rate_hz
         units = tuple(self._unit(k, slice(first, stop)) for k in range(len(self.model.units)))
@@ -125,7 +125,7 @@ class FootStream:
         return replace(self.model, time_s=time_s, units=units), _chosen(own, inside, slice(None))
 
     def forget(self, until_s: float) -> None:
-        """Let go of what a window that starts at ``until_s`` does not need."""
+        """Drop all that a window starting at ``until_s`` does not need."""
         self._hold_floor(until_s)
         first, _ = self._places(until_s - BACK_S - 1.0, until_s)
         self._first += first
@@ -137,6 +137,8 @@ class FootStream:
         self._contacts = _chosen(own, keep, slice(max(floors - 1, 0), None))
 
     def _places(self, start_s: float, end_s: float) -> tuple[int, int]:
+        """Indices, among the samples held, of the first sample from ``start_s`` on and from ``end_s`` on."""
+
         def place(at_s: float) -> int:
             if not np.isfinite(at_s):
                 return len(self._load)
@@ -145,11 +147,12 @@ class FootStream:
         return place(start_s), place(end_s)
 
     def _unit(self, column: int, rows: slice) -> UnitLoad:
+        """The loads of one unit in the given rows, with samples on the rail or beyond the calibration marked."""
         model, load = self.model.units[column], self._load[rows, column]
         missing = self._missing[rows, column]
         readings, nothing = self._readings[rows, column], np.zeros(load.size, dtype=bool)
         saturated = nothing
-        if readings.size and readings.max() >= self._top[column]:  # what was exceeded before is no rail
+        if readings.size and readings.max() >= self._top[column]:  # a value exceeded earlier is not the rail
             channel = replace(self._channels[column], values=readings, missing=missing if missing.any() else None)
             saturated = on_the_rail(channel)
         beyond = load > BEYOND * model.range_n if model.range_n else nothing

@@ -1,4 +1,4 @@
-"""Body weight, totals and the error to expect, from the sums of a trial's windows: of one, or of a day's."""
+"""Body weight, total force and expected error, from running sums over the windows of a trial."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from smartshoe.gait._total import SETTLED_S, whole_strides
 from smartshoe.gait._trial import Foot
 from smartshoe.gait._window import AnalysisWindow
 
-ONE_SHOE_SHARE_SD = 0.05  # of body weight: what one foot may bear more than half
-SWAY_S = 2.0  # spells of standing whose means count as independent
-WIDE_SD = 0.05  # of the force, where a single stride or spell shows no spread
+ONE_SHOE_SHARE_SD = 0.05  # of body weight: sd of the mean load on one foot about a half of it
+SWAY_S = 2.0  # length of standing whose means count as independent
+WIDE_SD = 0.05  # of the force: sd assumed if there is a single stride or spell
 
 
 @dataclass(frozen=True, slots=True)
 class BodyWeight:
-    """Body weight in N with its sd; ``source`` is "given", "strides", "standing" or "one_shoe"."""
+    """Body weight in N with its standard deviation; ``source`` is "given", "strides", "standing" or "one_shoe"."""
 
     value: float
     sd: float
@@ -31,7 +31,7 @@ class BodyWeight:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces of the whole body in N; None where they cannot be known."""
+    """Forces on the whole body in N; None where unknown."""
 
     body_weight: BodyWeight | None
     mean_total_n: float | None
@@ -40,6 +40,8 @@ class Forces:
 
 
 class _FootSums:
+    """Sums over the samples of one foot: its load, its load in swing, and the differences of its floors."""
+
     def __init__(self, regions: int) -> None:
         self.samples = self.swing_samples = 0
         self.load = np.zeros(regions)
@@ -66,13 +68,13 @@ class _FootSums:
 
     @property
     def floor_variance(self) -> float:
-        """Variance in N^2 of the mean floor: how much the floors of a swing's two ends differ, over all swings."""
+        """Variance in N^2 of the mean floor, from the differences of successive floors."""
         steps = self.floor_steps
         return steps.squares / steps.count / 2.0 / (steps.count + 1) if steps.count >= 3 else 0.0
 
 
 class _StrideForces:
-    """The mean totals of strides, and what they last."""
+    """Sums of the mean total force over strides, and of their durations."""
 
     def __init__(self) -> None:
         self.means = Moments()
@@ -84,23 +86,23 @@ class _StrideForces:
 
 
 class ForceSums:
-    """The sums of a trial of ``feet``, of whose load the units bear the share ``coverage``."""
+    """Sums over a trial of ``feet``, whose units bear the share ``coverage`` of the load."""
 
     def __init__(self, feet: Mapping[str, Foot], coverage: float) -> None:
         self._units, self._coverage = {name: foot.units for name, foot in feet.items()}, coverage
         self._is_known = all(foot.is_force for foot in feet.values())
         self._feet = {name: _FootSums(len(foot.units)) for name, foot in feet.items()}
         self._first = next(iter(feet))
-        self._strides = {True: _StrideForces(), False: _StrideForces()}  # of the first foot, of the other
+        self._strides = {True: _StrideForces(), False: _StrideForces()}  # strides of the first foot, and of the other
         self._standing = BlockMeans(max(1, round(SWAY_S * feet[self._first].rate_hz)))
         self._standing_s = 0.0
 
     def add_floors(self, foot: str, contacts: Contacts) -> None:
-        """The floors beside a foot's next contacts."""
+        """Add the floors that were read beside a foot's next contacts."""
         self._feet[foot].add_floors(contacts)
 
     def add(self, window: AnalysisWindow) -> None:
-        """One more window."""
+        """Add the loads, strides and standing of one more window."""
         for name, series in window.series.items():
             self._feet[name].add(window, series)
         total = window.total
@@ -125,7 +127,7 @@ class ForceSums:
         self._standing_s += standing_n.size * float(time_s[1] - time_s[0])
 
     def forces(self, given_n: float | None) -> Forces:
-        """What they come to; ``given_n`` is the body weight where it was given."""
+        """The forces of the trial so far; ``given_n`` is the body weight if it was given."""
         if not self._is_known:
             return Forces(None, None, None, None)
         moving = self._strides[self._strides[True].means.count > 0]
@@ -138,10 +140,11 @@ class ForceSums:
         return Forces(weight, weighted_mean(known), still_n, self._rmse())
 
     def _weight(self, given_n: float | None, moving: _StrideForces, still_n: float | None) -> BodyWeight | None:
-        """Body weight: as given, or the mean total over whole strides, or standing, whichever lasts longer.
+        """Body weight: as given, or the mean total force over whole strides or over standing, whichever lasts longer.
 
-        Over whole strides the body neither gains nor loses vertical momentum, so the mean total is its weight. The sd
-        holds the spread of strides, the gains' sd and the floors'; with one shoe twice its mean, and what that assumes.
+        Over whole strides the body neither gains nor loses vertical momentum, so the mean total force is its weight.
+        The sd combines the spread over strides with the sd of gains and floors. With one shoe the weight is twice its
+        mean, and the sd includes the uncertain share of that foot.
         """
         if given_n is not None:
             return BodyWeight(given_n, 0.0, "given")
@@ -165,10 +168,10 @@ class ForceSums:
         return np.array([unit.gain_sd for unit in self._units[foot]])
 
     def _rmse(self) -> float | None:
-        """The error in N to expect of the whole force.
+        """The expected error in N of the whole force; None if no swing was seen.
 
-        It is what the feet read in swing, where the true force is zero, and the gains' sd over the load they bear.
-        None where no swing was seen. What a load leaves behind in a unit while it lasts is in neither.
+        It combines the readings in swing, where the true force is zero, with the gains' sd times the load. The residual
+        deformation of a unit while it is loaded is in neither.
         """
         variance = 0.0
         for name, own in self._feet.items():

@@ -1,8 +1,8 @@
-"""Columns and clocks that may be exchanged or apart: what the loads themselves can say of it.
+"""Flags for exchanged columns or shoes and for clocks that differ, as far as the loads themselves show it.
 
-The vertical loads of whole shoes that changed sides look like those of shoes that did not: nothing here can notice
-that, only labels can. What can be noticed: an insole in the other shoe (its inner metatarsal becomes the outer one),
-single columns that changed sides, and two clocks that are apart.
+If both shoes are labelled with the wrong side, their vertical loads look like those of correctly labelled shoes; only
+labels can reveal that. The loads can reveal an insole in the other shoe (its inner metatarsal becomes the outer one),
+single columns that changed sides, and a difference of the two clocks.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ SELDOM = 0.2
 MOSTLY_WRONG = 0.5
 LEAST_LOOKED_S, LOOKED_S = 5.0, 60.0
 ALIKE = 0.2  # of the heavier foot's peak: a shoe that bears less was not worn
-QUIETER = 0.2  # of the time, both feet together
+QUIETER = 0.2  # of the time, for both feet together
 FEWEST = 5
-APART_S = 0.03  # what a gait's own asymmetry seldom makes of its two double supports
+APART_S = 0.03  # limit of the difference that a gait's own asymmetry makes between its two double supports
 SURE_S = 0.01
 DRIFT_S, DRIFT_SDS = 0.02, 6.0
 
 
 def label_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], strides: Sequence[Stride]) -> list[Flag]:
-    """Metatarsals, columns or shoes that seem exchanged."""
+    """Flags for metatarsal units, columns or shoes that seem exchanged."""
     flags: list[Flag] = []
     for name, foot in feet.items():
         named = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", Path(foot.source).stem.casefold())}
@@ -46,7 +46,7 @@ def label_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], stri
                     foot=name,
                 )
             )
-    # Without all units a foot's load has holes of its own, and nothing follows from its order.
+    # If a unit is missing, part of the foot's load is not seen, and the order of loading proves nothing.
     whole = all(len(one.regions) == len(REGIONS) for one in series.values())
     in_order = all(_is_in_order(one, strides) for one in series.values())
     region = _exchanged_sides(feet, series) if whole and not in_order else None
@@ -87,9 +87,9 @@ def _is_in_order(series: FootSeries, strides: Sequence[Stride]) -> bool:
 
 
 def _exchanged_sides(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> str | None:
-    """The region whose left and right columns, exchanged back, would let both feet swing; None where none would.
+    """The region whose left and right columns, exchanged back, would let both feet swing; None if there is none.
 
-    A foot that carries a column of the other one is loaded while it should swing.
+    A foot with one column of the other foot is loaded while it should swing.
     """
     if len(feet) < 2 or feet["left"].regions != feet["right"].regions:
         return None
@@ -100,23 +100,23 @@ def _exchanged_sides(feet: Mapping[str, Foot], series: Mapping[str, FootSeries])
     second = feet["right"].load
     count = min(len(first), len(second), round(LOOKED_S * feet["left"].rate_hz))
     first, second = first[:count], second[:count]
-    now = _quiet(first.sum(axis=1)) + _quiet(second.sum(axis=1))
+    now = _quiet_share(first.sum(axis=1)) + _quiet_share(second.sum(axis=1))
     gains: list[tuple[float, str]] = []
     for column, region in enumerate(feet["left"].regions):
         moved = second[:, column] - first[:, column]
-        gains.append((_quiet(first.sum(axis=1) + moved) + _quiet(second.sum(axis=1) - moved) - now, region))
+        gains.append((_quiet_share(first.sum(axis=1) + moved) + _quiet_share(second.sum(axis=1) - moved) - now, region))
     gain, region = max(gains)
     return region if gain > QUIETER else None
 
 
-def _quiet(whole: Array) -> float:
-    """The share of time that a foot's load (n,) is near its floor."""
+def _quiet_share(whole: Array) -> float:
+    """The share of time during which a foot's load (n,) is near its floor."""
     low, high = np.quantile(whole, [0.01, 0.95])
     return float(np.mean(whole < low + 0.1 * (high - low))) if high > low else 0.0
 
 
 def _out_of_order(series: FootSeries, strides: Sequence[Stride]) -> Flag | None:
-    """Said of a foot whose stances mostly break the order heel, flat, heel off; None where they do not."""
+    """A flag if most stances of a foot break the order heel, flat, heel off; None otherwise."""
     own = [stride for stride in strides if stride.foot == series.name]
     wrong, count = sequence_errors(series.contacts, own)
     if count < FEWEST or wrong < MOSTLY_WRONG * count:
@@ -145,6 +145,7 @@ def _out_of_order(series: FootSeries, strides: Sequence[Stride]) -> Flag | None:
 
 
 def _is_inside_out(series: FootSeries) -> bool:
+    """Whether the first metatarsal unit is mostly loaded before the fourth, and more."""
     contacts = series.contacts
     meta4, meta1 = contacts.of_region("meta4"), contacts.of_region("meta1")
     if meta4 is None or meta1 is None or not series.usual_peak[meta1] > series.usual_peak[meta4]:
@@ -155,10 +156,10 @@ def _is_inside_out(series: FootSeries) -> bool:
 
 
 def clock_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], strides: Sequence[Stride]) -> list[Flag]:
-    """Whether the right shoe's clock is apart from the left's, by the two double supports (or flights) of a stride.
+    """Flags if the right shoe's clock differs from the left one's, by the two double supports (or flights) of a stride.
 
-    A clock that is late by d makes one longer by d and the other shorter by d. So does a limp; only where walking
-    would have a flight, or running a double support, can it be nothing but the clocks.
+    A clock that is late by d makes one of them longer by d and the other shorter by d. A limp does so too; only where
+    walking would have a flight, or running a double support, must it be the clocks.
     """
     if len(feet) < 2 or not strides or feet["left"].regions != feet["right"].regions:
         return []
@@ -194,7 +195,7 @@ def clock_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], stri
 
 
 def _overlaps(strike_s: Array, other_strike_s: Array, other_off_s: Array) -> tuple[Array, Array]:
-    """For each heel strike how long the other foot stays down (negative: has been up), and when that was."""
+    """For each heel strike, how long in s the other foot stays down (negative if it is up already), and its time."""
     strike = strike_s[np.isfinite(strike_s)]
     known = np.isfinite(other_off_s) & np.isfinite(other_strike_s)
     off, begin = other_off_s[known], other_strike_s[known]
@@ -208,7 +209,7 @@ def _overlaps(strike_s: Array, other_strike_s: Array, other_off_s: Array) -> tup
 
 
 def _drift(first_s: Array, at_s: Array, second_s: Array, other_s: Array) -> list[Flag]:
-    """The clocks' rates, from the difference of the two overlaps as it runs away over the record."""
+    """A flag if the clocks' rates differ: the difference of the two overlaps then grows over the record."""
     difference = 0.5 * (first_s - np.interp(at_s, other_s, second_s))
     if difference.size < 4 * FEWEST:
         return []

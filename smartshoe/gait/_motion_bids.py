@@ -1,4 +1,4 @@
-"""A trial as a Motion-BIDS folder (Brain Imaging Data Structure 1.9, motion): how open gait data is shared."""
+"""Writes a trial as a Motion-BIDS folder (Brain Imaging Data Structure 1.9, motion), a format for shared gait data."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ TRACKSYS = "shoe"
 def write_motion_bids(
     folder: Path | str, found: GaitResult, *, subject: str, task: str = "walk", title: str = "Smart shoe trials"
 ) -> list[Path]:
-    """Write the trial of ``subject`` doing ``task`` into the data set ``folder``, made where it is missing.
+    """Write the trial of ``subject`` doing ``task`` into the data set ``folder``, which is created if missing.
 
-    The first column is the trial's own time in s (type LATENCY), the others are the forces' table (type MISC): units,
-    feet, total, centre of pressure; ``n/a`` where nothing is known. Events count from the first sample, as BIDS has
-    it. Returns the trial's files. Raises `UsageError` for a label that is not of letters and digits, and where the
-    trial is in the data set already.
+    The first column is the trial's own time in s (type LATENCY), the others are the table of forces (type MISC): units,
+    feet, total, centre of pressure; ``n/a`` where unknown. Event times count from the first sample, as BIDS requires.
+    Returns the paths of the trial's files. Raises `UsageError` for a label with other characters than letters and
+    digits, and if the trial is already in the data set.
     """
     for key, label in (("subject", subject), ("task", task)):
         if not re.fullmatch(r"[A-Za-z0-9]+", label):
@@ -76,7 +76,7 @@ def write_motion_bids(
 
 
 def _describe(root: Path, subject: str, title: str) -> None:
-    """What stands once in a data set, and the subject's line."""
+    """Write the files that a data set has once, and add the subject to the list of participants if it is not there."""
     from smartshoe.version import __version__
 
     description = root / "dataset_description.json"
@@ -90,12 +90,12 @@ def _describe(root: Path, subject: str, title: str) -> None:
     participants = root / "participants.tsv"
     known = participants.read_text(encoding="utf-8") if participants.exists() else "participant_id\n"
     if f"sub-{subject}" not in [line.split("\t")[0] for line in known.splitlines()]:
-        # Further columns of a list that is there are not known of this subject.
+        # The list may have further columns, which are unknown for this subject.
         more = f"\t{MISSING}" * known.splitlines()[0].count("\t")
         write_text(participants, f"{known.rstrip()}\nsub-{subject}{more}\n")
 
 
 def _tsv(table: pd.DataFrame, *, header: bool = True) -> str:
-    """Tab-separated, numbers in full precision."""
+    """Tab-separated text with numbers in full precision."""
     cells = table.replace([np.inf, -np.inf], np.nan)
     return str(cells.to_csv(sep="\t", index=False, header=header, na_rep=MISSING, lineterminator="\n"))

@@ -1,4 +1,4 @@
-"""`GaitResult`: what is known of a trial, as numbers, as tables and as the contract's object."""
+"""`GaitResult` and `DayResult`: what is known of a trial, as numbers, as tables and as an object for JSON."""
 
 from __future__ import annotations
 
@@ -30,23 +30,24 @@ SCHEMA = "smartshoe.gait/1"
 
 
 class Figures(dict[str, Any]):
-    """Figures by name; called, the table of them for a person, as the other results' ``summary()``."""
+    """Summary figures by name; calling the object gives them as a text table, like other results' ``summary()``."""
 
     def __init__(self, figures: Mapping[str, Any], table: SummaryTable) -> None:
         super().__init__(figures)
         self._table = table
 
     def __call__(self) -> str:
-        """The table for a person, as text of several lines."""
+        """The table as text of several lines."""
         return self._table.to_text()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GaitFindings(Shown):
-    """What is known of any trial: ``events`` in order of time, ``strides`` in that of their start, ``indices`` by foot.
+    """The results that every trial has.
 
-    ``figures`` are what `summary` shows. ``coverage`` is the share that the units bear, ``covering`` how it was allowed
-    for. `to_dict` is the object of ``smartshoe gait --json``.
+    ``events`` are in order of time, ``strides`` in order of their start, ``indices`` are by foot. ``figures`` are what
+    `summary` shows. ``coverage`` is the share of the load on the units, ``covering`` how it was applied. `to_dict`
+    returns the object of ``smartshoe gait --json``.
     """
 
     activity: Activity
@@ -63,11 +64,11 @@ class GaitFindings(Shown):
 
     @property
     def summary(self) -> Figures:
-        """Figures by name, ``summary["cadence_steps_per_min"]``; ``summary()`` is their table as text."""
+        """Figures by name, as in ``summary["cadence_steps_per_min"]``; ``summary()`` returns a table as text."""
         return Figures(self.figures, self._summary_table())
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.gait/1; no NaN, no infinity."""
+        """The result in schema smartshoe.gait/1, without NaN or infinity."""
         weight = self.forces.body_weight
         return {
             "schema": SCHEMA,
@@ -100,6 +101,7 @@ class GaitFindings(Shown):
         raise UsageError(f"table {table!r} is not known of a {type(self).__name__}: use one of {known}")
 
     def _summary_table(self) -> SummaryTable:
+        """The figures that are single numbers, and the flags, as a table."""
         weight = self.forces.body_weight
         rows = [
             [name.replace("_", " "), significant(value) if isinstance(value, (int, float)) else str(value)]
@@ -117,10 +119,10 @@ class GaitFindings(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GaitResult(GaitFindings):
-    """A trial with its signals: ``feet`` holds each foot against time.
+    """A trial with its signals: ``feet`` holds each foot's series over time.
 
-    ``total_time_s`` and ``total_n`` (n,) are both feet's force, None where it is not known; ``standing_s`` are begin
-    and end of each spell of standing.
+    ``total_n`` (n,) at ``total_time_s`` (n,) is the force of both feet, None if unknown; ``standing_s`` holds begin and
+    end of each spell of standing.
     """
 
     feet: Mapping[str, FootSeries]
@@ -142,7 +144,10 @@ class GaitResult(GaitFindings):
         return pd.DataFrame(forces)
 
     def plot(self) -> Figure:
-        """A figure: by foot, its force over time (its units' readings where no force is known), and the events."""
+        """A figure with a panel for each foot: force over time and the events.
+
+        If no force is known, the readings of the units are shown.
+        """
         figure, axes = panels(len(self.feet))
         for axis, (name, foot) in zip(axes, self.feet.items(), strict=True):
             if foot.force_n is not None:
@@ -158,32 +163,33 @@ class GaitResult(GaitFindings):
         return figure
 
     def columns(self) -> dict[str, Any]:
-        """The table of forces by column: units, feet, total, centre of pressure (% of the insole), phase.
+        """The table of forces by column: units, feet, total, centre of pressure (% of the insole's length), phase.
 
-        A phase is 0 in swing, 1 on the heel, 2 on the flat foot, 3 in push.
-        On the first foot's times; the other's are interpolated where its clock differs. NaN where nothing is known.
+        Phase is 0 in swing, 1 on the heel, 2 on the flat foot, 3 in push. Times are those of the first foot; the other
+        foot is interpolated if its times differ. NaN where unknown.
         """
         base = next(iter(self.feet.values())).time_s
         found: dict[str, Any] = {"time_s": base}
         for name, foot in self.feet.items():
             suffix = "n" if foot.is_force else foot.symbol.casefold()
             for column, region in enumerate(foot.regions):
-                found[f"{name}_{region}_{suffix}"] = _on(base, foot, foot.load[:, column])
+                found[f"{name}_{region}_{suffix}"] = _interpolated(base, foot, foot.load[:, column])
             if foot.force_n is not None:
-                found[f"{name}_total_n"] = _on(base, foot, foot.force_n)
+                found[f"{name}_total_n"] = _interpolated(base, foot, foot.force_n)
             if foot.sd_n is not None:
-                found[f"{name}_total_sd_n"] = _on(base, foot, foot.sd_n)
+                found[f"{name}_total_sd_n"] = _interpolated(base, foot, foot.sd_n)
         if self.total_n is not None:
             found["total_n"] = np.interp(base, self.total_time_s, self.total_n, left=np.nan, right=np.nan)
         for name, foot in self.feet.items():
             for column, way in enumerate(("along", "medial")):
-                found[f"{name}_centre_{way}_percent"] = 100.0 * _on(base, foot, foot.centre[:, column])
+                found[f"{name}_centre_{way}_percent"] = 100.0 * _interpolated(base, foot, foot.centre[:, column])
             nearest = np.clip(np.round((base - foot.time_s[0]) * foot.rate_hz).astype(int), 0, foot.time_s.size - 1)
             found[f"{name}_phase"] = foot.state[nearest]
         return found
 
 
-def _on(base: Array, foot: FootSeries, values: Array) -> Array:
+def _interpolated(base: Array, foot: FootSeries, values: Array) -> Array:
+    """Values (n,) of a foot interpolated at the times ``base``; NaN outside the foot's own times."""
     if base is foot.time_s:
         return values
     return np.asarray(np.interp(base, foot.time_s, values, left=np.nan, right=np.nan))
@@ -191,9 +197,10 @@ def _on(base: Array, foot: FootSeries, values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DayResult(GaitFindings):
-    """A long trial: numbers and flags of the whole, and no signal against time.
+    """A long trial: numbers and flags of the whole, but no signals over time.
 
-    ``events`` and ``strides`` are the first ones, up to ``listed_s``, of ``event_count`` and ``stride_count``.
+    ``events`` and ``strides`` are only the first ones, up to time ``listed_s`` (None if all are listed), of
+    ``event_count`` and ``stride_count``.
     """
 
     duration_s: float
@@ -203,7 +210,7 @@ class DayResult(GaitFindings):
     listed_s: float | None
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.gait/1 with an object ``stream`` beside it."""
+        """The result in schema smartshoe.gait/1, with an additional object ``stream``."""
         return super().to_dict() | {
             "stream": {
                 "duration_s": self.duration_s,
@@ -215,7 +222,7 @@ class DayResult(GaitFindings):
         }
 
     def plot(self) -> Figure:
-        """A figure: by foot, how long each listed stride lasts, and the share of it that the foot is down."""
+        """A figure with the duration of each listed stride, and its stance as a share of it, by foot."""
         figure, (times, shares) = panels(2)
         for name in self.indices:
             own = [stride for stride in self.strides if stride.foot == name]

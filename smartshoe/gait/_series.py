@@ -1,4 +1,4 @@
-"""A foot against time: everything that follows from its loads and contacts, sample by sample."""
+"""`FootSeries`: everything that follows from one foot's loads and contacts, sample by sample."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from smartshoe.gait.phases import crisp
 
 @dataclass(frozen=True, eq=False)
 class FootSeries:
-    """One foot against time: everything (n,) or (n, r) on ``time_s`` (n,).
+    """One foot over time; all arrays are (n,) or (n, r) at the times ``time_s`` (n,).
 
-    ``load`` (n, r) of its units above their floors, in N where ``is_force``; ``force_n`` (n,) the whole foot's,
-    coverage allowed for, None where the loads are no forces; ``sd_n`` (n,) its error bar by the estimator, None
-    without one (it knows nothing of what passes beside the units); ``centre`` (n, 2) of pressure, along and medial as
-    shares of the insole's length, NaN in swing; ``state`` (n,) an index into `smartshoe.gait.phases.PHASES`;
-    ``membership`` (n, 6) in `smartshoe.gait.membership.PHASES`, ``abnormality`` (n,).
+    ``load`` (n, r) is the load of each unit above its floor, in N if ``is_force``. ``force_n`` (n,) is the force on the
+    whole foot, corrected for coverage, None if the loads are not in N. ``sd_n`` (n,) is its error bar from the
+    estimator, None without one; it does not include the error of the coverage. ``centre`` (n, 2) is the centre of
+    pressure, along and medial, as shares of the insole's length, NaN in swing. ``state`` (n,) is an index into
+    `smartshoe.gait.phases.PHASES`. ``membership`` (n, 6) refers to `smartshoe.gait.membership.PHASES`; ``abnormality``
+    (n,) is what fits none of them.
     """
 
     name: str
@@ -46,7 +47,7 @@ class FootSeries:
 
 
 def series_of(foot: Foot, contacts: Contacts, load: Array, coverage: Coverage, usual_peak: Array) -> FootSeries:
-    """The series of ``foot`` with the ``load`` (n, r) above its floor; ``usual_peak`` (r,) of its units."""
+    """The series of ``foot`` from its ``load`` (n, r) above the floor and each unit's usual peak (r,)."""
     membership, abnormality = memberships(load, foot.regions, usual_peak)
     return FootSeries(
         name=foot.name,

@@ -1,4 +1,4 @@
-"""Strides: from one heel strike to the next of the same foot, with what a gait lab tells of each."""
+"""Strides: from one heel strike to the next of the same foot, with the quantities a gait laboratory reports."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.gait._contact import Contacts
 from smartshoe.signals.masks import runs_of
 
-LONGEST_S = 3.5  # from strike to strike: longer, the person stood in between
-LONGEST_GAP_S = 0.1  # in one piece: straight lines bridge single samples well
+LONGEST_S = 3.5  # from strike to strike; if longer, the person stood in between
+LONGEST_GAP_S = 0.1  # in one piece; linear interpolation bridges single samples well
 MOST_MISSING = 0.3  # of a stride
-RUNS_BELOW = 50.0  # percent of a stride that the feet are down
-RATE_FROM, RATE_TO = 0.2, 0.8  # of the first peak: where the loading rate is taken
+RUNS_BELOW = 50.0  # percent of a stride during which the foot is down
+RATE_FROM, RATE_TO = 0.2, 0.8  # of the first peak: between these the loading rate is measured
 
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """One stride of one foot. Forces and what follows from them are None where the loads are not in N.
+    """One stride of one foot. Forces, and what follows from them, are None if the loads are not in N.
 
     ``peak_n``, the vertical impulse ``impulse_n_s`` and ``loading_rate_n_per_s`` (mean slope from a fifth to four
-    fifths of the first peak) are those of the whole foot, coverage allowed for. ``runs`` says that the feet are down
-    for less than half of it on average, so that a flight follows; ``gap`` that samples are missing in it: it counts in
-    no mean.
+    fifths of the first peak) are those of the whole foot, corrected for coverage. ``runs`` is true if the feet are down
+    for less than half of it on average, so that a flight follows. ``gap`` is true if samples are missing; the stride
+    then counts in no mean.
     """
 
     foot: str
@@ -44,16 +44,16 @@ class Stride:
 
     @property
     def time_s(self) -> float:
-        """How long it lasts."""
+        """Duration in s."""
         return self.end_s - self.start_s
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it, by name."""
+        """All fields by name."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 def strides_of(foot: str, contacts: Contacts, time_s: Array, force_n: Array | None, missing: Mask) -> list[Stride]:
-    """The strides of one foot; ``force_n`` (n,) is its whole vertical force, None where it is not known."""
+    """The strides of one foot. ``force_n`` (n,) is its whole vertical force, None if unknown."""
     if len(contacts) < 2:
         return []
     start_s, end_s, toe_off_s = contacts.strike_s[:-1], contacts.strike_s[1:], contacts.toe_off_s[:-1]
@@ -84,7 +84,7 @@ def strides_of(foot: str, contacts: Contacts, time_s: Array, force_n: Array | No
 
 
 def _loses(gaps: tuple[Index, Index], first: int, last: int, rate_hz: float) -> bool:
-    """Whether the samples [``first``, ``last``) lose more than `LONGEST_GAP_S` in one piece."""
+    """Whether more than `LONGEST_GAP_S` of the samples [``first``, ``last``) is missing in one piece."""
     start, stop = gaps
     k = slice(int(np.searchsorted(stop, first, side="right")), int(np.searchsorted(start, last)))
     longest = np.minimum(stop[k], last) - np.maximum(start[k], first)
@@ -92,10 +92,10 @@ def _loses(gaps: tuple[Index, Index], first: int, last: int, rate_hz: float) -> 
 
 
 def with_runs(strides: Sequence[Stride]) -> list[Stride]:
-    """The strides of both feet in order of their start, each with whether it runs.
+    """The strides of both feet in order of their start, each with ``runs`` set.
 
-    The stance share is that of the stride and of the other foot's that begins nearest: a limp has a foot that is down
-    for less than half of its stride, and still walks.
+    A stride runs if its stance share, averaged with that of the other foot's stride that begins nearest, is below a
+    half: in a limp one foot is down for less than half of its stride, and that is still walking.
     """
     ordered = sorted(strides, key=lambda stride: (stride.start_s, stride.foot))
     start_s = {foot: np.array([s.start_s for s in ordered if s.foot == foot]) for foot in {s.foot for s in ordered}}
@@ -112,7 +112,7 @@ def with_runs(strides: Sequence[Stride]) -> list[Stride]:
 
 
 def loading_rate(stance_n: Array, rate_hz: float) -> float | None:
-    """Mean slope in N/s from a fifth to four fifths of the first peak of a stance (n,); None where there is none."""
+    """Mean slope in N/s from a fifth to four fifths of the first peak of a stance (n,); None if there is no rise."""
     half = stance_n[: max(2, stance_n.size // 2)]
     peak = float(half.max())
     low, high = int(np.argmax(half >= RATE_FROM * peak)), int(np.argmax(half >= RATE_TO * peak))
@@ -120,10 +120,11 @@ def loading_rate(stance_n: Array, rate_hz: float) -> float | None:
     def place(at: int, level: float) -> float:
         return at if at == 0 else at - (half[at] - level) / (half[at] - half[at - 1])
 
-    # A stance that is there with its first sample, or bears nothing, takes no time to rise.
+    # A stance that begins above the first level, or bears no load, has no measurable rise.
     took = place(high, RATE_TO * peak) - place(low, RATE_FROM * peak)
     return float((RATE_TO - RATE_FROM) * peak * rate_hz / took) if took > 0 else None
 
 
 def _maybe(value: float) -> float | None:
+    """The value, or None if it is not finite."""
     return float(value) if np.isfinite(value) else None

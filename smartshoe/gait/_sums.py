@@ -1,4 +1,4 @@
-"""What a trial comes to, by running sums: of a trial at once, or of a day window by window."""
+"""Running sums of a trial's strides and samples, added at once or window by window."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Moments:
     squares: float = 0.0
 
     def add(self, values: ArrayLike) -> None:
-        """Take in more values (n,)."""
+        """Add more values (n,)."""
         values = np.asarray(values, dtype=float)
         if values.size == 0:
             return
@@ -39,11 +39,11 @@ class Moments:
 
     @property
     def sd(self) -> float:
-        """The sample's standard deviation; 0 of fewer than two."""
+        """Sample standard deviation; 0 for fewer than two values."""
         return float(np.sqrt(self.squares / (self.count - 1))) if self.count > 1 else 0.0
 
     def spread(self) -> dict[str, float | None]:
-        """Mean and coefficient of variation, as the summary has them."""
+        """Mean and coefficient of variation in percent, as in the summary."""
         if not self.count:
             return {"mean": None, "cv_percent": None}
         return {"mean": self.mean, "cv_percent": 100.0 * self.sd / self.mean if self.count > 1 and self.mean else None}
@@ -51,7 +51,7 @@ class Moments:
 
 @dataclass
 class StrideSums:
-    """The sums of the strides of one kind, walking or running, without gaps."""
+    """Sums over strides of one kind, walking or running, without gaps."""
 
     feet: Sequence[str]
     of: dict[str, dict[str, Moments]] = field(default_factory=dict)
@@ -67,11 +67,11 @@ class StrideSums:
 
     @property
     def count(self) -> int:
-        """Of both feet."""
+        """Number of strides of both feet."""
         return sum(own.count for own in self.of["time_s"].values())
 
     def add(self, contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> None:
-        """More strides, with the contacts of both feet beside them."""
+        """Add strides, with the contacts of both feet around them."""
         if not strides:
             return
         for foot in self.feet:
@@ -88,6 +88,7 @@ class StrideSums:
         self._order(contacts, strides)
 
     def _order(self, contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> None:
+        """Count the orders in which units are loaded, and how often the fourth metatarsal precedes the first."""
         for foot, own in contacts.items():
             onset_s = own.onset_s[np.isin(own.strike_s, [s.start_s for s in strides if s.foot == foot])]
             seen = np.isfinite(onset_s)
@@ -100,7 +101,7 @@ class StrideSums:
                 self.earlier += int(np.count_nonzero(both[:, meta4] < both[:, meta1]))
 
     def summary(self) -> dict[str, Any]:
-        """The contract's summary, with more beside it."""
+        """The summary figures by name, as in the JSON output."""
 
         def sided(left: float | None, right: float | None) -> float | None:
             return None if left is None or right is None else asymmetry(left, right)
@@ -138,7 +139,7 @@ class StrideSums:
 
 @dataclass
 class BlockMeans:
-    """Mean of samples, and the spread of the means of ``size`` of them in a row, as they come."""
+    """Mean of a stream of samples, and the spread of the means of successive blocks of ``size`` samples."""
 
     size: int
     total: float = 0.0
@@ -147,7 +148,7 @@ class BlockMeans:
     _rest: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, values: Array) -> None:
-        """More samples (n,)."""
+        """Add more samples (n,)."""
         self.total += float(values.sum())
         self.count += values.size
         rest = np.concatenate([self._rest, values])
@@ -157,7 +158,7 @@ class BlockMeans:
 
 
 def weighted_mean(parts: Iterable[tuple[float, float]]) -> float | None:
-    """The mean of (value, weight); None without any."""
+    """The weighted mean of pairs (value, weight); None if the weights sum to zero."""
     held = list(parts)
     whole = sum(weight for _, weight in held)
     return sum(value * weight for value, weight in held) / whole if whole > 0.0 else None

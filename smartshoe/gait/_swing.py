@@ -1,9 +1,9 @@
-"""Where a foot is in the air: the coarse cut of a foot's load into swings and contacts, blind to offset and scale.
+"""Finds where a foot is in the air: an approximate division of its load into swings and contacts.
 
-A foot's load has a floor while it swings. The floor is found from the load itself, so that an offset does not matter,
-and the cut lies at shares of the load's height above it, so that body weight does not matter. Sway and shifts of
-weight have minima too, but round ones; a swing's walls are steep. A minimum counts where its width a tenth of the way
-up is at least `LEAST_SQUARENESS` of its width three tenths up (0.58 for a parabola, 0.9 for a swing).
+A foot's load has a floor while it swings. The floor is found from the load itself, so an offset does not matter, and
+the thresholds are shares of the load's height above it, so body weight does not matter. Sway and shifts of weight have
+minima too, but round ones, whereas the walls of a swing are steep. A minimum counts as a swing if its width a tenth of
+the way up is at least `LEAST_SQUARENESS` of its width three tenths up (0.58 for a parabola, 0.9 for a swing).
 """
 
 from __future__ import annotations
@@ -15,23 +15,26 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.signals.noise import white_noise_sd
 
-OFF, ON, UP = 0.10, 0.15, 0.30  # of the load's height above its floor: swing below, contact above, wall
+OFF, ON, UP = 0.10, 0.15, 0.30  # of the load's height above its floor: swing below OFF, contact above ON, wall at UP
 LEAST_SQUARENESS = 0.67
-LEAST_SWING_S = 0.18  # the valley of slow walking that dips below OFF is shorter
+LEAST_SWING_S = 0.18  # the dip below OFF in slow walking is shorter
 LEAST_CONTACT_S = 0.08
-SCUFF_S, SCUFF_SHARE = 0.16, 0.35  # a touch shorter and lighter (of the median peak) is no stance
-LEAST_OF_LEVEL = 0.15  # of its own level, that a load must vary for a swing to be in it
-LEAST_OF_SCALE = 0.3  # of the loads so far
+SCUFF_S, SCUFF_SHARE = 0.16, 0.35  # a contact that is shorter and lighter (of the median peak) is not a stance
+LEAST_OF_LEVEL = 0.15  # of the load's own level: least variation of a load with a swing in it
+LEAST_OF_SCALE = 0.3  # of the scale of the loads so far: the same
 NOISES = 12.0
-LIKE_FLOOR = 0.25  # of the scale, that a floor may differ from the last
+LIKE_FLOOR = 0.25  # of the scale: how far a floor may differ from the last
 MOST_TRENDS = 4
-RHYTHM = 3  # swings that make a new floor believed
+RHYTHM = 3  # number of swings from which a new floor is accepted
 SMOOTH_S, WIDE_S = 0.025, 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Swings [``start``, ``stop``) (k,) in samples, in order; all else is contact. ``noise`` is a sample's sd."""
+    """Swings [``start``, ``stop``) (k,) in samples, in order; all else is contact.
+
+    ``noise`` is the sd of one sample.
+    """
 
     start: Index
     stop: Index
@@ -39,7 +42,7 @@ class Cut:
 
 
 def boxcar(signal: Array, count: int) -> Array:
-    """Centred mean (n,) over ``count`` (made odd) samples, fewer at the ends."""
+    """Centred moving average (n,) over ``count`` samples (made odd), over fewer at the ends."""
     half = count // 2
     if half == 0 or signal.size == 0:
         return signal
@@ -50,13 +53,13 @@ def boxcar(signal: Array, count: int) -> Array:
 
 
 def cut(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
-    """The swings in a window of a foot's whole load (n,); None where the load does not vary as a swing makes it.
+    """The swings in a window of a foot's whole load (n,); None if the load varies too little to contain one.
 
-    ``scale`` and ``floor`` are those of the window before, None where nothing is known.
+    ``scale`` and ``floor`` are those of the window before, None if unknown.
     """
     found = _cut_level(load, rate_hz, least_load, scale, floor)
     for _ in range(MOST_TRENDS):
-        # A floor that drifts hides the swings far from the lowest one; those that are seen tell its slope.
+        # If the floor drifts, swings far from the lowest one are missed; those found show the slope.
         if found is None or found.start.size < 2:
             return found
         trend = _trend(load, found)
@@ -69,7 +72,7 @@ def cut(load: Array, rate_hz: float, least_load: float, scale: float | None, flo
 
 
 def _trend(load: Array, found: Cut) -> Array:
-    """The straight line (n,) that the floor follows, zero in the middle: the median of all slopes between swings."""
+    """The drift of the floor as a straight line (n,), zero in the middle, by the median slope over pairs of swings."""
     total = np.concatenate([[0.0], np.cumsum(load)])
     level = (total[found.stop] - total[found.start]) / (found.stop - found.start)
     place = 0.5 * (found.stop + found.start)
@@ -79,6 +82,7 @@ def _trend(load: Array, found: Cut) -> Array:
 
 
 def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
+    """The swings with the floor taken as level; None if the load varies too little or no swing is found."""
     noise = white_noise_sd(load)
     wide = boxcar(load, round(WIDE_S * rate_hz))
     low, high = float(wide.min()), float(wide.max())
@@ -90,7 +94,7 @@ def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | No
     smooth = boxcar(load, round(SMOOTH_S * rate_hz))
     start, stop = _low_runs(smooth, low + OFF * height, low + ON * height)
     start, stop = _without_short(start, stop, smooth.size, rate_hz)
-    start, stop = _square(smooth, start, stop, low, height, rate_hz)
+    start, stop = _with_steep_walls(smooth, start, stop, low, height, rate_hz)
     if start.size and floor is not None and scale is not None and start.size < RHYTHM:
         total = np.concatenate([[0.0], np.cumsum(smooth)])
         level = (total[stop] - total[start]) / (stop - start)
@@ -103,6 +107,7 @@ def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | No
 
 
 def _low_runs(smooth: Array, off: float, on: float) -> tuple[Index, Index]:
+    """Runs of samples [start, stop) below ``off`` that end where the load exceeds ``on``."""
     code = np.where(smooth >= on, 1, np.where(smooth < off, 0, -1))
     known = np.flatnonzero(code >= 0)
     if known.size == 0:
@@ -114,7 +119,7 @@ def _low_runs(smooth: Array, off: float, on: float) -> tuple[Index, Index]:
 
 
 def _without_short(start: Index, stop: Index, size: int, rate_hz: float) -> tuple[Index, Index]:
-    """Short swings filled, then short contacts removed; those that touch the window's ends may be longer outside."""
+    """Fill short swings, then remove short contacts; those at the window's ends may be longer outside and are kept."""
     keep = ((stop - start) >= LEAST_SWING_S * rate_hz) | (start == 0) | (stop == size)
     start, stop = start[keep], stop[keep]
     return _joined(start, stop, (start[1:] - stop[:-1]) >= LEAST_CONTACT_S * rate_hz)
@@ -126,7 +131,10 @@ def _joined(start: Index, stop: Index, apart: Mask) -> tuple[Index, Index]:
     return start[np.concatenate([[True], apart])], stop[np.concatenate([apart, [True]])]
 
 
-def _square(smooth: Array, start: Index, stop: Index, low: float, height: float, rate_hz: float) -> tuple[Index, Index]:
+def _with_steep_walls(
+    smooth: Array, start: Index, stop: Index, low: float, height: float, rate_hz: float
+) -> tuple[Index, Index]:
+    """The candidates with steep walls: about as wide at `OFF` as at `UP` of the height."""
     at = np.arange(smooth.size)
     wall = smooth > low + UP * height
     before = np.maximum.accumulate(np.where(wall, at, -1))
@@ -143,6 +151,7 @@ def _square(smooth: Array, start: Index, stop: Index, low: float, height: float,
 
 
 def _without_scuffs(smooth: Array, start: Index, stop: Index, low: float, rate_hz: float) -> tuple[Index, Index]:
+    """Join swings separated by a contact that is shorter and lighter than a stance."""
     if start.size < 3:
         return start, stop
     begins, ends = stop[:-1], start[1:]

@@ -1,4 +1,4 @@
-"""The whole force: a foot's above its floor, both feet's on one time base, and where it is that of a person at rest."""
+"""Forces of a foot above its floor, the total of both feet on one time base, and spells of standing."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from smartshoe.gait._strides import MOST_MISSING, Stride
 from smartshoe.gait._trial import Foot
 
 LEAST_STANDING_S = 2.0
-SETTLED_S = 0.5  # after which standing stands still
+SETTLED_S = 0.5  # at each end of a spell of standing, left out of its mean
 
 
 @dataclass(frozen=True, eq=False)
 class TotalForce:
-    """The feet's forces together: ``time_s`` and ``force_n`` (n,), and where either foot lacks a sample."""
+    """The sum of the feet's forces: ``force_n`` (n,) at ``time_s`` (n,), and where either foot lacks a sample."""
 
     time_s: Array
     force_n: Array
@@ -26,9 +26,9 @@ class TotalForce:
 
 
 def above_floor(foot: Foot, contacts: Contacts) -> Array:
-    """Loads (n, r) above what each unit reads in swing, straight lines between one swing's floor and the next.
+    """Loads (n, r) above what each unit reads in swing, which is interpolated linearly between swings.
 
-    Where no swing was seen the loads are taken as they are.
+    If no swing was seen the loads are returned as they are.
     """
     load = foot.load
     if contacts.floor_time_s.size == 0:
@@ -39,7 +39,7 @@ def above_floor(foot: Foot, contacts: Contacts) -> Array:
 
 
 def total_of(feet: Mapping[str, Foot], forces: Mapping[str, Array]) -> TotalForce:
-    """The sum of the feet's ``forces`` (n,), at the times of the first foot that all of them share."""
+    """The sum of the feet's ``forces`` (n,), at those times of the first foot at which all feet were recorded."""
     first = next(iter(feet))
     time_s = feet[first].time_s
     begin = max(foot.time_s[0] for foot in feet.values())
@@ -57,7 +57,7 @@ def total_of(feet: Mapping[str, Foot], forces: Mapping[str, Array]) -> TotalForc
 def standing_spans(
     feet: Mapping[str, Foot], contacts: Mapping[str, Contacts], loaded: Mapping[str, bool]
 ) -> list[tuple[float, float]]:
-    """Begin and end in s of the spells in which every foot stays down for 2 s or more."""
+    """Begin and end in s of the spells in which every foot stays down for `LEAST_STANDING_S` or more."""
     spans: list[tuple[float, float]] | None = None
     for name, foot in feet.items():
         own = [
@@ -68,7 +68,7 @@ def standing_spans(
             for strike, off in zip(contacts[name].strike_s, contacts[name].toe_off_s, strict=True)
         ]
         if not own and not loaded[name]:
-            continue  # a foot that bears nothing takes no part: standing on the other leg
+            continue  # an unloaded foot is ignored: the person stands on the other leg
         if not own:
             own = [(float(foot.time_s[0]), float(foot.time_s[-1]))]
         own = [span for span in own if span[1] - span[0] >= LEAST_STANDING_S]
@@ -77,14 +77,14 @@ def standing_spans(
 
 
 def _shared(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """What each of ``first`` shares with each of ``second``; those that do not meet end before they begin."""
+    """The intersection of each of ``first`` with each of ``second``; an empty one ends before it begins."""
     return sorted((max(a, c), min(b, d)) for a, b in first for c, d in second)
 
 
 def whole_strides(total: TotalForce, strides: Sequence[Stride]) -> list[Stride]:
-    """Those within the total's two samples or more while neither foot misses more than `MOST_MISSING` of its own.
+    """The strides without gaps within the time of ``total``, with at most `MOST_MISSING` of its samples missing.
 
-    While one foot lacks a unit the total is too small, whichever foot steps.
+    While one foot lacks a unit the total is too small, whichever foot steps. ``total`` has at least two samples.
     """
     time_s = total.time_s
     gone = np.concatenate([[0.0], np.cumsum(total.missing)])

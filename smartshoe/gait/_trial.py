@@ -1,4 +1,4 @@
-"""A trial's shoes: recordings sorted into feet, each on an even time base with its units' loads."""
+"""Sorts a trial's recordings into feet, each with its units' loads on an even time base."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 FEET = ("left", "right")
 GAP_STEPS = 2.5
-NEGATIVE = 10.0  # times further below zero than above it, loads count tension
+NEGATIVE = 10.0  # times further below zero than above it: loads for which tension is positive
 FEWEST_STEPS_PER_S = 0.2
-CALM_S, CALM_SHARE = 0.1, 0.2  # a fifth of the time at least a foot is in the air
+CALM_S, CALM_SHARE = 0.1, 0.2  # of the time: a foot is in the air at least that long
 LEAST_RATE_HZ = 40.0
 FEWEST_SAMPLES = 8
 _QUANTITIES = frozenset({"force", "pressure", "voltage", "counts", "resistance", "length", "unknown", "dimensionless"})
@@ -32,9 +32,9 @@ _QUANTITIES = frozenset({"force", "pressure", "voltage", "counts", "resistance",
 
 @dataclass(frozen=True, eq=False)
 class Foot:
-    """One shoe's loads: ``load`` (n, r) on the even times ``time_s`` (n,), a column a region, or fewer.
+    """One shoe's loads: ``load`` (n, r) at the evenly spaced times ``time_s`` (n,), with a column for each unit.
 
-    ``turned`` says that its loads came negative and their sign was turned.
+    ``turned`` is true if the loads came negative and their sign was changed.
     """
 
     name: str
@@ -46,17 +46,17 @@ class Foot:
 
     @property
     def regions(self) -> tuple[str, ...]:
-        """The units' regions, in the columns' order."""
+        """The region of each unit, in the order of the columns."""
         return tuple(unit.name.split("_", 1)[-1] for unit in self.units)
 
     @property
     def load(self) -> Array:
-        """(n, r) loads as estimated, floors and all."""
+        """(n, r) loads as estimated; floors are not subtracted."""
         return np.column_stack([unit.load for unit in self.units])
 
     @property
     def sd_n(self) -> Array | None:
-        """(n,) the error bar of the units' sum in N; None without an estimator that gives one."""
+        """(n,) error bar of the sum over the units in N; None unless every unit has one."""
         known = [unit.sd_n for unit in self.units if unit.sd_n is not None]
         return np.asarray(np.sqrt(np.sum(np.square(known), axis=0))) if len(known) == len(self.units) else None
 
@@ -67,18 +67,18 @@ class Foot:
 
     @property
     def missing(self) -> Mask:
-        """(n,) where any unit has no sample."""
+        """(n,) True where any unit lacks a sample."""
         return np.asarray(np.any([unit.missing for unit in self.units], axis=0))
 
 
 def feet_of(
     recordings: Sequence[Recording], calibrations: Sequence[Calibration], estimator: str | None = None
 ) -> tuple[dict[str, Foot], list[Flag]]:
-    """The feet of one trial, and what was noticed on the way.
+    """Sort the recordings of one trial into feet, and return them with the flags raised on the way.
 
-    One recording may hold both shoes; two recordings hold one each. Columns without a side belong to the side that
-    the recording's unit, name or file gives away. Raises `InputError` where no unit of a shoe is there, `UsageError`
-    where two recordings or two calibrations claim the same unit, `UnitError` for units that are no loads.
+    One recording may hold both shoes; two recordings hold one each. Columns without a side belong to the side named in
+    the recording's unit, name or file. Raises `InputError` if no unit of a shoe is there, `UsageError` if two
+    recordings or two calibrations claim the same unit, and `UnitError` for columns that are not loads.
     """
     if not recordings:
         raise UsageError("a trial needs at least one recording: give one")
@@ -104,6 +104,7 @@ def feet_of(
 
 
 def _by_unit(calibrations: Sequence[Calibration]) -> Mapping[str, Calibration]:
+    """The calibrations by the name of their unit; raises `UsageError` if two have the same."""
     found: dict[str, Calibration] = {}
     for calibration in calibrations:
         if calibration.unit in found:
@@ -118,6 +119,7 @@ def _by_unit(calibrations: Sequence[Calibration]) -> Mapping[str, Calibration]:
 def _sides(
     recording: Recording, number: int, taken: set[str]
 ) -> tuple[dict[str, list[tuple[str, Channel]]], list[Flag]]:
+    """The units' channels of each foot in a recording, with flags; ``taken`` are the feet of earlier recordings."""
     named = {name: channel for name, channel in recording.channels.items() if name in UNITS_OF_A_SHOE}
     if not named:
         raise MissingChannelError(
@@ -159,6 +161,7 @@ def _sides(
 
 
 def _side_named(recording: Recording) -> str | None:
+    """The only foot named in the recording's unit, metadata, name or source; None if there is none."""
     for text in (recording.unit or "", recording.metadata.get("side", ""), recording.name, recording.source):
         found = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", text.casefold())}
         if len(found) == 1:
@@ -173,6 +176,7 @@ def _foot(
     by_name: Mapping[str, Calibration],
     estimator: str | None,
 ) -> Foot:
+    """A foot with its units' loads on an even time base, with the sign turned if compression is negative."""
     if len(recording) < FEWEST_SAMPLES:
         raise InputError(f"{recording.label} holds {len(recording)} samples: a trial needs some seconds of them")
     time_s, rate_hz, on_grid = _even(recording)
@@ -181,7 +185,7 @@ def _foot(
     )
     kinds = {unit.is_force for unit in units}
     if len(kinds) == 2:
-        # Forces and readings cannot be added: loads of the units without a calibration count as readings of none.
+        # Forces and uncalibrated readings cannot be added.
         bare = [unit.name for unit in units if not unit.is_force]
         raise InputError(
             f"{recording.label}: no calibration of {', '.join(bare)}, whose columns are not in N, as other units are:"
@@ -194,9 +198,10 @@ def _foot(
 
 
 def _is_upside_down(load: Array, rate_hz: float) -> bool:
-    """Whether compression is negative in ``load`` (n,): mostly below zero, and at rest at its top where it steps.
+    """Whether compression is negative in ``load`` (n,).
 
-    A zero that is far off makes a load negative too; but a foot in the air is calm, and that is its lowest load.
+    It is if the load is mostly below zero and, where it has steps, at rest near its maximum. A large zero error makes a
+    load negative too; but a foot in the air is at rest, and its load is then at its minimum.
     """
     low, high = (float(level) for level in np.quantile(load, [0.01, 0.99]))
     if -low <= NEGATIVE * max(high, 0.0):
@@ -212,13 +217,13 @@ def _is_upside_down(load: Array, rate_hz: float) -> bool:
 
 
 def _even(recording: Recording):  # type: ignore[no-untyped-def]  # the third is a function of a channel
-    """Even times (n,) with the recording's median step, their rate, and the way of a channel on to them."""
+    """Even times (n,) with the recording's median step, their rate in Hz, and a function that resamples a channel."""
     time_s = recording.time_s
     step = recording.sample_time_s
     if recording.is_uniform:
         count = time_s.size
         grid = time_s[0] + np.arange(count) * (time_s[-1] - time_s[0]) / (count - 1)
-        # Nine digits: a clock that starts elsewhere must not change the rate by its rounding.
+        # Rounded to nine digits: a clock with another start must not change the rate by rounding.
         return grid, float(f"{(count - 1) / (time_s[-1] - time_s[0]):.9g}"), lambda channel: channel
     count = int(np.floor((time_s[-1] - time_s[0]) / step + 1e-6)) + 1
     grid = time_s[0] + step * np.arange(count)

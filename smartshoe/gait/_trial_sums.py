@@ -1,4 +1,4 @@
-"""What the windows of a trial, one of a short one or a day's many, add up to: activity, summary, indices, forces."""
+"""Sums over the windows of a trial, one for a short trial and many for a day: activity, summary, indices, forces."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from smartshoe.gait.summary import Activity, activity_by_time
 
 
 class _Regularity:
-    """How regular one foot's strides of one kind are."""
+    """How regular one foot's strides of one kind (walking or running) are."""
 
     def __init__(self, regions: int, reference: Array | None) -> None:
         self.wrong = self.judged = self.count = self.inside = 0
@@ -54,10 +54,10 @@ class _Regularity:
 
 
 class TrialSums:
-    """The sums of a trial of ``feet``, window by window.
+    """Sums over a trial of ``feet``, window by window.
 
-    ``reference`` are patterns (`POINTS`, r) by foot, with which strides are compared; without it each foot's pattern is
-    its own mean stride up to the window that is compared.
+    ``reference`` are patterns (`POINTS`, r) by foot, with which strides are compared; without it a foot's pattern is
+    its own mean stride up to and including the window compared.
     """
 
     def __init__(self, feet: Mapping[str, Foot], coverage: float, reference: Mapping[str, Array] | None = None) -> None:
@@ -69,7 +69,7 @@ class TrialSums:
             for runs in (False, True)
             for name, foot in feet.items()
         }
-        self._time_s = {False: 0.0, True: 0.0}  # of strides of either kind, gaps or none
+        self._time_s = {False: 0.0, True: 0.0}  # duration of walking (False) and running (True) strides, gaps or not
         self._stepping: set[str] = set()
         self.strides = {False: 0, True: 0}
         self.standing_s = 0.0
@@ -83,13 +83,13 @@ class TrialSums:
         return any(self.strides.values()) or self.standing_s > 0.0
 
     def add_contacts(self, foot: str, contacts: Contacts) -> None:
-        """A foot's next contacts, with the floors beside them."""
+        """Add a foot's next contacts, with the floors beside them."""
         self.contacts[foot] += len(contacts)
         self.floors[foot] += contacts.floor_time_s.size
         self._forces.add_floors(foot, contacts)
 
     def add(self, window: AnalysisWindow) -> None:
-        """One more window."""
+        """Add one more window."""
         self._forces.add(window)
         self.was_loaded |= any(window.loaded.values())
         contacts = window.contacts
@@ -110,14 +110,14 @@ class TrialSums:
         return self._kinds[True].count > self._kinds[False].count
 
     def activity(self) -> Activity:
-        """What most of the trial is, by time; a foot runs that is down for less than half a stride."""
+        """The activity that takes most of the time."""
         feet = max(len(self._stepping), 1)
         return activity_by_time(
             {"walking": self._time_s[False] / feet, "running": self._time_s[True] / feet, "standing": self.standing_s}
         )
 
     def summary(self) -> dict[str, Any]:
-        """Of the strides without gaps of the main activity."""
+        """The summary figures of the strides without gaps of the main activity."""
         return self._kinds[self._main].summary()
 
     def indices(self) -> dict[str, dict[str, float | None]]:
@@ -125,5 +125,5 @@ class TrialSums:
         return {name: self._regular[self._main, name].to_dict() for name in self._feet}
 
     def forces(self, given_n: float | None) -> Forces:
-        """Body weight and totals; ``given_n`` is the body weight where it was given."""
+        """Body weight and total forces; ``given_n`` is the body weight if it was given."""
         return self._forces.forces(given_n)

@@ -1,4 +1,4 @@
-"""A window of a trial: all of a short one, or two minutes of a day with some seconds of their neighbours in sight."""
+"""`AnalysisWindow`: a whole short trial, or two minutes of a day together with some seconds on either side."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from smartshoe.gait._trial import Foot
 
 @dataclass(frozen=True, eq=False)
 class AnalysisWindow:
-    """What was found from ``start_s`` on and before ``end_s``; ``feet``, ``series`` and ``contacts`` reach beyond.
+    """What was found from ``start_s`` on and before ``end_s``; ``feet``, ``series`` and ``contacts`` reach beyond it.
 
-    ``strides`` begin in it; ``spans`` are of standing, whole ones. ``total`` is the sum of the feet's forces, None
-    where one is no force.
+    ``strides`` are those that begin in the window; ``spans`` are begin and end of spells of standing, not cut at the
+    window's ends. ``total`` is the sum of the feet's forces, None if a foot's loads are not in N.
     """
 
     start_s: float
@@ -42,7 +42,7 @@ class AnalysisWindow:
         return {name: one.contacts for name, one in self.series.items()}
 
     def own(self, time_s: Array) -> Mask:
-        """(n,) which times are the window's own."""
+        """(n,) True where a time lies inside the window."""
         return (time_s >= self.start_s - 1e-9) & (time_s < self.end_s - 1e-9)
 
 
@@ -56,9 +56,9 @@ def analyse_window(
     start_s: float = -np.inf,
     end_s: float = np.inf,
 ) -> AnalysisWindow:
-    """The window from ``start_s`` to ``end_s`` of ``feet`` with their ``contacts``, both of which may reach beyond it.
+    """Analyse the window from ``start_s`` to ``end_s`` of ``feet`` and ``contacts``, both of which may reach beyond it.
 
-    ``peaks`` are each foot's units' peaks (r,) in the stances before the window, to which the window's are added.
+    ``peaks`` holds, for each foot, its units' peaks (r,) in earlier stances; those of this window are added to it.
     """
     peaks = {name: [] for name in feet} if peaks is None else peaks
     loads = {name: above_floor(foot, contacts[name]) for name, foot in feet.items()}
@@ -83,14 +83,14 @@ def analyse_window(
 
 
 def is_loaded(foot: Foot, load: Array, body_weight_n: float | None) -> bool:
-    """Whether the foot bears at all; of readings without a calibration only steps can tell."""
+    """Whether the foot bears load on average; false for uncalibrated readings, in which only steps can show it."""
     if not foot.is_force:
         return False
     return float(np.mean(load.sum(axis=1))) > max(LEAST_LOAD_N, 0.05 * (body_weight_n or 0.0))
 
 
 def _peaks_of(time_s: Array, load: Array, contacts: Contacts, start_s: float, end_s: float) -> list[Array]:
-    """Each unit's peak (r,) in the stances that end from ``start_s`` on and before ``end_s``."""
+    """The peaks (r,) of the units in each stance that ends from ``start_s`` on and before ``end_s``."""
     with np.errstate(invalid="ignore"):
         known = np.isfinite(contacts.strike_s) & (contacts.toe_off_s >= start_s) & (contacts.toe_off_s < end_s)
     bounds = np.searchsorted(time_s, np.column_stack([contacts.strike_s[known], contacts.toe_off_s[known]]))
@@ -98,6 +98,6 @@ def _peaks_of(time_s: Array, load: Array, contacts: Contacts, start_s: float, en
 
 
 def _usual_peak(peaks: Sequence[Array], load: Array) -> Array:
-    """Each unit's median peak (r,), its largest load (n, r) where no stance is known."""
+    """The median peak (r,) of each unit, at least 0; its largest load (n, r) if no stance is known."""
     found = np.median(np.array(peaks), axis=0) if len(peaks) else load.max(axis=0)
     return np.asarray(np.maximum(found, 0.0))

@@ -1,4 +1,4 @@
-"""A long trial's events and strides as tables, written as they come."""
+"""Writes a long trial's events and strides as tables while they are found."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ DIGITS = 9  # of a number, as in the tables of a short trial
 
 @contextmanager
 def tables(folder: Path) -> Iterator[Callable[[Sequence[Event], Sequence[Stride]], None]]:
-    """What `smartshoe.gait.analyse_stream` reports, as ``events.csv`` and ``strides.csv`` in ``folder``.
+    """Write what `smartshoe.gait.analyse_stream` reports to ``events.csv`` and ``strides.csv`` in ``folder``.
 
-    Yields the function to hand to ``report``. The files are there when the block ends without an error, whole.
+    Yields the function to pass as ``report``. The files appear, complete, when the block ends without an error.
     """
     with ExitStack() as stack:
         files = []

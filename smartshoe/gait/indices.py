@@ -1,4 +1,4 @@
-"""How regular a gait is: errors of sequence, and distance from a reference pattern."""
+"""Indices of how regular a gait is: errors of the sequence of events, and distance from a reference pattern."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ POINTS = 101  # of a stride, 0 to 100 %
 
 
 def overlaid(strides: Sequence[Stride], time_s: Array, loads: Array) -> Array:
-    """Loads (n, r) or (n,) of each stride at 0 to 100 % of it: (m, `POINTS`, r) or (m, `POINTS`)."""
+    """The loads (n, r) or (n,) of each stride resampled at 0 to 100 % of it: (m, `POINTS`, r) or (m, `POINTS`)."""
     start = np.array([stride.start_s for stride in strides])
     end = np.array([stride.end_s for stride in strides])
     at = start[:, None] + (end - start)[:, None] * np.linspace(0.0, 1.0, POINTS)[None, :]
@@ -27,15 +27,15 @@ def overlaid(strides: Sequence[Stride], time_s: Array, loads: Array) -> Array:
 
 
 def pattern(mean: Array) -> Array | None:
-    """A foot's mean stride (`POINTS`, r), divided by the largest whole load of it; None where it bears none."""
+    """A foot's mean stride (`POINTS`, r) divided by the largest sum over its units; None if it bears no load."""
     largest = float(mean.sum(axis=1).max())
     return np.asarray(mean / largest) if largest > 0 else None
 
 
 def deviations(each: Array, reference: Array) -> Array:
-    """Distance (m,) of strides (m, `POINTS`, r) from a pattern (`POINTS`, r): rms, in percent of the pattern's peak.
+    """Distance (m,) of strides (m, `POINTS`, r) from a pattern (`POINTS`, r): rms in percent of the pattern's peak.
 
-    Each stride is divided by the foot's mean peak, so that body weight does not matter and a light step does.
+    Strides are divided by the peak of the foot's mean stride, so body weight does not matter, but a lighter step does.
     """
     largest = float(each.mean(axis=0).sum(axis=1).max())
     if not largest > 0:
@@ -44,10 +44,10 @@ def deviations(each: Array, reference: Array) -> Array:
 
 
 def sequence_errors(contacts: Contacts, strides: Sequence[Stride]) -> tuple[int, int]:
-    """How many strides break the order heel strike, foot flat, heel off, toe off, and of how many.
+    """How many strides break the order heel strike, foot flat, heel off, toe off, and how many were judged.
 
-    An event that is missing breaks it, as does a unit of the forefoot that is loaded before the heel. Of none where
-    the shoe has no heel or no metatarsal unit to tell foot flat and heel off by.
+    A missing event breaks the order, as does a forefoot unit that is loaded before the heel. (0, 0) if the shoe has no
+    heel unit or no metatarsal unit, without which foot flat and heel off are unknown.
     """
     if contacts.of_region("heel") is None or {"meta1", "meta4"}.isdisjoint(contacts.regions):
         return 0, 0

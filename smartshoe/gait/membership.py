@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 
-# Which units are large and which small in a phase; a unit in neither may be either.
+# Regions whose load is large, and regions whose load is small, in each phase; the others may be either.
 PHASES: Mapping[str, tuple[frozenset[str], frozenset[str]]] = {
     "initial_contact": (frozenset({"heel"}), frozenset({"meta4", "meta1", "toe"})),
     "loading_response": (frozenset({"heel", "meta4"}), frozenset({"meta1", "toe"})),
@@ -23,20 +23,20 @@ PHASES: Mapping[str, tuple[frozenset[str], frozenset[str]]] = {
     "pre_swing": (frozenset({"toe"}), frozenset({"heel", "meta4", "meta1"})),
     "swing": (frozenset(), frozenset({"heel", "meta4", "meta1", "toe"})),
 }
-MIDDLE, WIDTH = 0.15, 0.05  # shares of a unit's median peak: where large begins, and how softly
+MIDDLE, WIDTH = 0.15, 0.05  # of a unit's median peak: where "large" begins, and how wide the transition is
 SLIGHT = 1e-9
 
 
 def large(share: Array) -> Array:
-    """How large a load is, 0 to 1, from its share of the usual peak: 0.5 at `MIDDLE`."""
+    """Degree, 0 to 1, to which a load is large, from its share of the usual peak: 0.5 at `MIDDLE`."""
     return np.asarray(0.5 + 0.5 * np.tanh((share - MIDDLE) / WIDTH))
 
 
 def memberships(load: Array, regions: Sequence[str], usual_peak: Array) -> tuple[Array, Array]:
     """Membership (n, 6) in `PHASES`, summing to 1, and abnormality (n,), 0 to 1, from loads (n, r).
 
-    ``usual_peak`` (r,) is what each unit usually reaches in a stance; a unit that never bears (0) counts as small
-    in every phase. Abnormality is what no product claims: near one where the loads fit no phase.
+    ``usual_peak`` (r,) is what each unit usually reaches in a stance; a unit that never bears load (0) counts as small
+    in every phase. Abnormality is one minus the sum of the products: near one where the loads fit no phase.
     """
     usual = np.where(usual_peak > 0, usual_peak, np.inf)
     much = large(load / usual)

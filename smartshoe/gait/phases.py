@@ -1,4 +1,4 @@
-"""The crisp phases of a stance: four states, cut at the events."""
+"""The four distinct phases of a stride, separated by the gait events."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ SWING, HEEL, FLAT, PUSH = range(4)
 def crisp(contacts: Contacts, time_s: Array) -> States:
     """The state (n,) at the times (n,), as an index into `PHASES`.
 
-    swing, then heel (heel strike to foot flat), flat (to heel off), push (to toe off). A stance without a foot flat
-    or a heel off has no heel or no push phase.
+    The order is swing, heel (from heel strike to foot flat), flat (to heel off), push (to toe off). A stance without
+    foot flat has no heel phase, one without heel off no push phase.
     """
     state = np.zeros(time_s.size, dtype=np.int8)
     if len(contacts) == 0:
         return state
     strike_s = np.where(np.isfinite(contacts.strike_s), contacts.strike_s, time_s[0])
     toe_off_s = np.where(np.isfinite(contacts.toe_off_s), contacts.toe_off_s, np.inf)
-    # A stance that the record's end cuts may still come to lie flat; a whole one that did not began flat.
+    # A stance cut off by the record's end may have its foot flat later; a complete one without it began flat.
     unseen_s = np.where(np.isfinite(contacts.toe_off_s), strike_s, np.inf)
     flat_s = np.where(np.isfinite(contacts.foot_flat_s), contacts.foot_flat_s, unseen_s)
     heel_off_s = np.where(np.isfinite(contacts.heel_off_s), contacts.heel_off_s, toe_off_s)
-    # Out of order, the later event gives way: the sequence errors tell of it.
+    # If the events are out of order the later one is moved; the index of sequence errors reports that.
     flat_s = np.clip(flat_s, strike_s, heel_off_s)
     which = np.searchsorted(strike_s, time_s, side="right") - 1
     on = which >= 0

@@ -1,4 +1,4 @@
-"""The trial in numbers: cadence, times, shares, symmetry, variability, order of contact."""
+"""The trial in numbers: activity, step times, double support, flight and asymmetry."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from smartshoe.gait._strides import Stride
 
 Activity = Literal["walking", "running", "standing", "mixed"]
 
-MOSTLY = 0.85  # of the time in which any activity is known, that makes an activity the trial's
+MOSTLY = 0.85  # of the time with a known activity: share that makes an activity the trial's
 LONGEST_STEP_S = 2.0
 ROUNDING = 1e-9  # of a stride
 
 
 def activity_by_time(spent: Mapping[Activity, float]) -> Activity:
-    """The activity that most of the time in s is spent on, "mixed" where none is."""
+    """The activity that takes at least `MOSTLY` of the time in s, "mixed" if none does."""
     whole = sum(spent.values())
     for activity, time_s in spent.items():
         if whole > 0.0 and time_s >= MOSTLY * whole:
@@ -28,20 +28,20 @@ def activity_by_time(spent: Mapping[Activity, float]) -> Activity:
 
 
 def of_main_activity(strides: Sequence[Stride]) -> list[Stride]:
-    """The strides without gaps of what there is more of, walking or running."""
+    """The strides without gaps of the more frequent kind, walking or running."""
     whole = [stride for stride in strides if not stride.gap]
     runs = sum(stride.runs for stride in whole) > len(whole) / 2
     return [stride for stride in whole if stride.runs == runs]
 
 
 def asymmetry(left: float, right: float) -> float:
-    """Right less left over their mean, in percent (Robinson et al. 1987)."""
+    """Right minus left, divided by their mean, in percent (Robinson et al. 1987); 0 if the mean is 0."""
     mean = 0.5 * (left + right)
     return 100.0 * (right - left) / mean if mean else 0.0
 
 
 def steps_of(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> dict[str, Array]:
-    """Step times in s by the foot that lands: from the other foot's heel strike, within the strides given."""
+    """Step times in s by the foot that lands, from the other foot's heel strike, within the strides given."""
     feet = list(contacts)
     if len(feet) < 2:
         return {}
@@ -59,9 +59,9 @@ def steps_of(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> dic
 
 
 def both_down(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> tuple[float, float] | None:
-    """Double support and flight as percent of a stride, means over the strides; None with one shoe.
+    """Double support and flight in percent of a stride, as means over the strides; None with one shoe.
 
-    In each stride the other foot's contacts are laid over this one's.
+    Each stride is compared with the other foot's contacts during it.
     """
     feet = list(contacts)
     if len(feet) < 2 or not strides:
@@ -78,7 +78,7 @@ def both_down(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> tu
         toe_off = np.array([s.toe_off_s for s in own])
         first = np.searchsorted(off, start, side="right")
         over, down = np.zeros(start.size), np.zeros(start.size)
-        for ahead in range(3):  # a stride meets two contacts of the other foot, three where one is short
+        for ahead in range(3):  # a stride overlaps two contacts of the other foot, or three if one is short
             k = np.minimum(first + ahead, strike.size - 1)
             there = first + ahead < strike.size
             over += there * np.maximum(0.0, np.minimum(off[k], toe_off) - np.maximum(strike[k], start))

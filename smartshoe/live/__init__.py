@@ -1,1 +1,1 @@
-"""A shoe seen while it is worn: one stream into journal, table, outlet and page, and the server that shows it."""
+"""The live display: a worn shoe's stream is recorded, sent to LSL and shown on a page that a local server provides."""

@@ -1,4 +1,4 @@
-"""The checks that a worn shoe allows, made again and again on the last half minute."""
+"""`Battery`: the field checks of a worn shoe, repeated on the last half minute of its readings."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ FEWEST_S = 3.0
 
 
 class Battery:
-    """``checks``: by shoe, each a verdict ('ok', 'warning', 'fault', 'unknown'), a kind, a unit and a sentence.
+    """The current check results of a session's shoes, and the wearer's body weight.
 
-    ``weight`` is the body's as the forces have it, None where no unit has a calibration or nobody walks.
+    ``checks`` holds for each shoe a list of objects with verdict ('ok', 'warning', 'fault', 'unknown'), kind, unit and
+    a sentence. ``weight`` is the body weight in N with its sd, None if no unit has a calibration or nobody walks.
     """
 
     def __init__(self, session: LiveSession) -> None:
@@ -27,7 +28,7 @@ class Battery:
         self.weight: dict[str, float] | None = None
 
     def look(self) -> None:
-        """Make every check once."""
+        """Carry out all checks once and store their results."""
         recordings: list[Recording] = []
         checks: list[list[dict[str, Any]]] = []
         for live in self._session.shoes:
@@ -41,21 +42,23 @@ class Battery:
         self.weight = self._weighed(recordings)
 
     def forget(self) -> None:
-        """Nothing is known any more."""
+        """Discard all results."""
         self.checks, self.weight = [[] for _ in self._session.shoes], None
 
     def _weighed(self, recordings: list[Recording]) -> dict[str, float] | None:
+        """The body weight in N with its sd, from all shoes' recordings; None if it cannot be found."""
         calibrations = [c for live in self._session.shoes for c in live.calibrations]
         if not calibrations or not recordings:
             return None
         try:
             found = analyse(recordings, calibrations).forces.body_weight
         except SmartShoeError:
-            return None  # nobody walks: nothing to weigh
+            return None  # nobody walks, so no weight can be found
         return None if found is None else {"value": found.value, "sd": found.sd}
 
 
 def _examined(live: LiveShoe, recording: Recording) -> list[dict[str, Any]]:
+    """The findings about one shoe as objects for JSON, without the zero, which is set by a button."""
     try:
         found = examine(recording, live.calibrations)
     except SmartShoeError as error:

@@ -1,4 +1,4 @@
-"""One page: what it has been sent, what it is sent next, what it asks for."""
+"""`Client`: the server's side of one open page; what was sent to it, what is to be sent, and its requests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALL = -(1 << 62)
 
 
 class Client:
-    """A page of ``desk``. It misses nothing by being slow: a frame holds all columns since the last one it took."""
+    """One page of ``desk``. A slow page misses no sample: a frame holds all columns since the last frame it took."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk, self._session = desk, desk.session
@@ -31,12 +31,12 @@ class Client:
         self._noted, self._stepped, self._state = self._session.noted, self._session.stepped, ""
 
     def hello(self) -> dict[str, Any]:
-        """The first message."""
+        """The first message to the page, as an object for JSON."""
         self._noted, self._stepped = self._session.noted, self._session.stepped
         return self._desk.hello(self.view)
 
     def news(self) -> list[str]:
-        """What is no picture and was not sent yet, as JSON."""
+        """All messages other than frames that were not sent yet, as JSON texts."""
         messages: list[str] = []
         while self.answers:
             messages.append(json.dumps(self.answers.popleft(), allow_nan=False))
@@ -55,7 +55,7 @@ class Client:
         return messages
 
     def frame(self) -> bytes | None:
-        """The next picture; None while the page is paused."""
+        """The next binary frame; None while the page is paused."""
         if self.is_paused:
             return None
         session = self._session
@@ -68,12 +68,12 @@ class Client:
                 self._zeros[k], self._places[k] = live.zero, ALL
             new = columns.since(self._places[k])
             if len(columns):
-                self._places[k] = int(columns.place[-1])  # it may grow: it is sent again
+                self._places[k] = int(columns.place[-1])  # the last column may still grow: it is sent again
             parts.append(shoe_bytes(new, *live.now()))
         return b"".join(parts)
 
     def take(self, text: str | None) -> dict[str, Any] | None:
-        """Do what a message of the page asks; the answer, where there is one to give."""
+        """Carry out a message from the page; returns the reply to it, or None."""
         try:
             asked = json.loads(text or "")
         except (ValueError, RecursionError):
@@ -86,6 +86,7 @@ class Client:
             return {"type": "refused", "says": str(error)}
 
     def _do(self, asked: dict[str, Any]) -> dict[str, Any] | None:
+        """Carry out a request, checked to be an object; returns the reply to it, or None."""
         match asked.get("do"):
             case "view":
                 self.view = view_of(asked.get("seconds"), asked.get("columns"))

@@ -1,4 +1,4 @@
-"""What all pages share: reductions of the traces, the checks, the state that is sent twice a second."""
+"""`Desk`: what all pages share, that is, the reduced traces, the checks, and the state sent twice a second."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CHECK_EVERY_S = 4.0
 
 
 class Desk:
-    """Pages' common part of ``session``; used by the server's thread only, but for the checks."""
+    """The shared part of all pages of ``session``. Only the server's thread uses it; the checks run in another."""
 
     def __init__(self, session: LiveSession) -> None:
         self.session = session
@@ -31,7 +31,7 @@ class Desk:
         self._checking: threading.Thread | None = None
 
     def reductions(self, view: PageView) -> list[Reduction]:
-        """Each shoe's traces in ``view``; those of views that no page has any more are let go."""
+        """Each shoe's traces reduced for ``view``; those of views that no page uses any more are dropped."""
         if view not in self._reductions:
             wanted = {client.view for client in self.clients} | {view}
             self._reductions = {each: reduction for each, reduction in self._reductions.items() if each in wanted}
@@ -39,7 +39,7 @@ class Desk:
         return self._reductions[view]
 
     def state(self) -> str:
-        """The state as JSON, made anew every `STATE_EVERY_S`."""
+        """The session's state as JSON, renewed every `STATE_EVERY_S`."""
         now_s = self.session.pace.clock()
         if now_s >= self._state_due_s:
             self._state_due_s = now_s + STATE_EVERY_S
@@ -49,7 +49,7 @@ class Desk:
         return self._state
 
     def hello(self, view: PageView) -> dict[str, Any]:
-        """What a page has to know before its first picture."""
+        """What a page has to know before its first frame, as an object for JSON."""
         session = self.session
         return {
             "type": "hello",
@@ -74,21 +74,22 @@ class Desk:
         }
 
     def start(self) -> None:
-        """Begin to check, in a thread of its own."""
+        """Start the checks, in a thread of their own."""
         self._checking = threading.Thread(target=self._check, name="checks", daemon=True)
         self._checking.start()
 
     def close(self) -> None:
-        """End checking."""
+        """Stop the checks."""
         self._stop.set()
         if self._checking is not None:
             self._checking.join(5.0)
 
     def _check(self) -> None:
+        """Repeat the checks until the desk is closed."""
         while not self._stop.wait(CHECK_EVERY_S):
             try:
                 self.battery.look()
-            except Exception as error:  # a fault of ours must be seen, not leave old checks standing
+            except Exception as error:  # a bug must become visible, instead of leaving old results on the page
                 self.battery.forget()
                 self.session.note("failed", f"the checks ended ({type(error).__name__}: {error}); please report this")
                 raise

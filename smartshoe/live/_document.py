@@ -1,4 +1,4 @@
-"""The page as one document that needs nothing else: markup, style and script put together."""
+"""Builds the page as one self-contained document from its markup, style and scripts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smartshoe.gait.insole import OUTLINE, PLACES
 
 
 def document() -> tuple[str, str]:
-    """The page, and the content security policy by which nothing but its own script and style is taken."""
+    """The page's HTML, and a content security policy that allows only the page's own script and style."""
     folder = files("smartshoe.live") / "page"
     style = (folder / "live.css").read_text(encoding="utf-8")
     facts = f"const INSOLE = {json.dumps({'outline': OUTLINE, 'places': dict(PLACES)})};\n"

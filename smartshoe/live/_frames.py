@@ -1,4 +1,4 @@
-r"""What goes to a page: one binary frame a picture, and JSON for what is not a picture.
+r"""Messages to a page: binary frames with the traces (JSON carries all else), and the views they are reduced for.
 
 A frame, little-endian:
 
@@ -27,7 +27,7 @@ then for each shoe
 \      f32[n c]     greatest value
 ====== ============ ============================================================
 
-A column that was sent before is sent again while samples are still added to it. NaN is no value.
+A column that was sent before is sent again while samples are still added to it. NaN means no value.
 """
 
 from __future__ import annotations
@@ -53,19 +53,19 @@ FEWEST_COLUMNS, MOST_COLUMNS = 100, 1600
 
 @dataclass(frozen=True)
 class PageView:
-    """What a page shows: the last ``seconds`` of the traces, in ``columns`` of pixels."""
+    """What a page shows: the last ``seconds`` of the traces, in ``columns`` columns of pixels."""
 
     seconds: float = 20.0
     columns: int = 600
 
     @property
     def width_s(self) -> float:
-        """A column's width in seconds."""
+        """Width of a column in seconds."""
         return self.seconds / self.columns
 
 
 def view_of(seconds: object, columns: object) -> PageView:
-    """The view nearest to what a page asks for: there are few, so that what is reduced is shared."""
+    """The permitted view nearest to the one a page asks for; there are few, so pages can share reduced traces."""
     usual = PageView()
     wanted_s = float(seconds) if _is_number(seconds) else usual.seconds
     count = float(columns) if _is_number(columns) else usual.columns
@@ -78,7 +78,7 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 class Reduction:
-    """One shoe's traces in columns of one view, brought up to date as pages ask."""
+    """One shoe's traces reduced to the columns of one view, updated when a page asks for them."""
 
     def __init__(self, live: LiveShoe, view: PageView) -> None:
         self._live, self._view = live, view
@@ -86,7 +86,7 @@ class Reduction:
         self._columns: PixelColumns | None = None
 
     def columns(self) -> PixelColumns:
-        """All columns of the view."""
+        """All columns of the view, up to the latest sample."""
         if self._columns is None or self._zero is not self._live.zero:
             self._place, self._columns, self._zero = 0, None, self._live.zero
         self._place, time_s, rows = self._live.since(self._place)
@@ -96,7 +96,7 @@ class Reduction:
 
 
 def shoe_bytes(columns: PixelColumns, values: Array, feet: Sequence[FootNow]) -> bytes:
-    """A shoe's part of a frame."""
+    """The part of a frame that belongs to one shoe."""
     first = int(columns.place[0]) if len(columns) else 0
     of_feet = [(-1.0 if f.phase is None else float(f.phase), f.load, *f.centre) for f in feet]
     return b"".join(
@@ -112,5 +112,5 @@ def shoe_bytes(columns: PixelColumns, values: Array, feet: Sequence[FootNow]) ->
 
 
 def head_bytes(shoes: int, number: int, now_s: float, width_s: float) -> bytes:
-    """A frame's head."""
+    """The head of a frame."""
     return _HEAD.pack(VERSION, shoes, 0, number & 0xFFFFFFFF, now_s, width_s)

@@ -1,4 +1,4 @@
-"""Who may ask: hosts by name, pages of our own, and whoever has the token."""
+"""`Guard`: decides which requests the live server accepts, by host name, origin and token."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 
 class Guard:
-    """Refuses, before anything else sees it, a request of another page, under another name or without the token.
+    """ASGI middleware that refuses requests from another page, under another host name or without the token.
 
-    ``port`` is ours. Without a ``token`` only the loopback's names are taken as Host, so that no page of elsewhere can
-    point a name of its own at us. An Origin must be the address that the request was sent to; programs send none.
+    ``port`` is the server's own. Without a ``token``, only the loopback's names are accepted as Host, so that no
+    foreign page can point a name of its own at this server. An Origin must equal the address that the request was sent
+    to; programs send none.
     """
 
     def __init__(self, app: App, port: int, token: str | None) -> None:
@@ -37,6 +38,7 @@ class Guard:
         await self._app(scope, receive, send)
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+        """The status and reason for which a request is refused; None if it is accepted."""
         headers: dict[bytes, list[bytes]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.lower(), []).append(value)
@@ -53,6 +55,7 @@ class Guard:
         return None
 
     def _has_token(self, scope: Scope, authorization: list[bytes]) -> bool:
+        """Whether the query or the Authorization header contains the token."""
         assert self._token is not None
         given = [
             v.encode() for v in parse_qs(scope["query_string"].decode("latin-1"), errors="replace").get("token", [])
@@ -62,6 +65,7 @@ class Guard:
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, says: str) -> None:
+    """Answer a request with a refusal: close a websocket, or send a plain text."""
     if scope["type"] == "websocket":
         await receive()  # websocket.connect
         await send({"type": "websocket.close", "code": 1008, "reason": says})

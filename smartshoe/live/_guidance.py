@@ -1,4 +1,4 @@
-"""What a calibration session asks of the person at the machine, as a page shows it, and what the page answers."""
+"""`Guidance`: the instructions and questions of a calibration session, as shown on a page, and the page's answers."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ PROGRESS_STEP_S = 0.2
 
 
 class Guidance:
-    """The sentence that stands, how far the pressing is, and an answer where one is waited for; for any thread.
+    """The current instruction, the progress of the pressing, and the answer to a question; safe to use from any thread.
 
-    ``version`` rises with each change that a page is to show.
+    ``version`` increases with each change that a page has to show.
     """
 
     def __init__(self) -> None:
@@ -26,13 +26,13 @@ class Guidance:
         self._answer: str | None = None
 
     def tell(self, says: str) -> None:
-        """The sentence that stands from now on."""
+        """Set the sentence that is shown from now on."""
         with self._lock:
             self._says = says
             self.version += 1
 
     def progress(self, experiment: str, elapsed_s: float, duration_s: float) -> None:
-        """``elapsed_s`` of a pressing of ``duration_s``; an empty name where nothing is pressed."""
+        """Report ``elapsed_s`` of a pressing of ``duration_s``; ``experiment`` is empty if nothing is pressed."""
         with self._lock:
             if experiment == self._experiment and abs(elapsed_s - self._elapsed_s) < PROGRESS_STEP_S:
                 return
@@ -40,7 +40,7 @@ class Guidance:
             self.version += 1
 
     def ask(self, says: str, answers: Sequence[str]) -> None:
-        """Put a question with its ``answers``; `answer` is None until one of them is given."""
+        """Ask a question with its possible ``answers``; `answer` is None until one of them is given."""
         with self._lock:
             self._says, self._answers, self._answer = says, tuple(answers), None
             self._question += 1
@@ -48,12 +48,12 @@ class Guidance:
 
     @property
     def answer(self) -> str | None:
-        """What was answered to the question that stands."""
+        """The answer to the current question; None if it was not answered yet."""
         with self._lock:
             return self._answer
 
     def take(self, question: object, answer: object) -> bool:
-        """An answer of a page to the question of that number; whether it was one that is waited for."""
+        """Take a page's answer to the question of that number; returns whether that answer was expected."""
         with self._lock:
             if question != self._question or answer not in self._answers or self._answer is not None:
                 return False
@@ -61,13 +61,13 @@ class Guidance:
             return True
 
     def settle(self) -> None:
-        """The question is answered, here or elsewhere: nothing is asked."""
+        """Withdraw the question, since it was answered here or elsewhere."""
         with self._lock:
             self._answers = ()
             self.version += 1
 
     def to_dict(self) -> dict[str, Any]:
-        """The message that a page gets."""
+        """The current state as the message for a page."""
         with self._lock:
             return {
                 "type": "task",

@@ -1,4 +1,4 @@
-"""A shoe's samples to the Lab Streaming Layer: one outlet a shoe, with names, units and what is known of its clock."""
+"""Sends a shoe's samples to the Lab Streaming Layer: one outlet a shoe, with names, units and facts about its clock."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 
 class Outlet:
-    """An outlet of type "Force" where every unit has a calibration, else "Pressure"; closed with the object.
+    """An outlet of type "Force" if every unit has a calibration, otherwise "Pressure"; deleting the object closes it.
 
-    Its stamps are the samples' times on this computer's clock (`local_clock`), by the fit of the shoe's clock, so they
-    carry its error and its one constant delay; the last channel, ``device_time``, is the shoe's own time.
+    Its time stamps are the samples' times on this computer's clock (`local_clock`), from the fit of the shoe's clock;
+    they contain the error of that fit and its constant delay. The last channel, ``device_time``, is the shoe's own
+    time.
     """
 
     def __init__(self, live: LiveShoe, clock_now_s: float) -> None:
@@ -41,20 +42,21 @@ class Outlet:
         clock.append_child_value("constant_delay", "unknown, one for the whole stream")
         info.desc().append_child_value("manufacturer", "smartshoe")
         self._outlet: Any = pylsl.StreamOutlet(info)
-        # LSL's clock and ours go at one pace: the distance is taken once.
+        # LSL's clock and the host's run at the same rate, so their difference is measured once.
         self._ahead_s = float(pylsl.local_clock()) - clock_now_s
 
     def push(self, block: Block, host_s: Array, force_n: dict[str, Array]) -> None:
-        """Send a block whose samples' host times are ``host_s`` (n,)."""
+        """Send a block whose samples were taken at the host times ``host_s`` (n,)."""
         readings = np.where(block.missing, np.nan, block.readings)
         rows = np.column_stack([readings, *force_n.values(), block.time_s])
         self._outlet.push_chunk(rows, (host_s + self._ahead_s).tolist())
 
 
 def _pylsl() -> Any:
+    """The module pylsl; raises `UsageError` if it or liblsl is missing."""
     try:
         import pylsl
-    except (ImportError, RuntimeError, OSError) as error:  # pylsl raises RuntimeError where liblsl is not there
+    except (ImportError, RuntimeError, OSError) as error:  # pylsl raises RuntimeError if liblsl is missing
         raise UsageError(
             f"--lsl needs pylsl and liblsl ({_first_line(error)}): install 'smartshoe[lsl]' and liblsl"
         ) from error

@@ -1,4 +1,4 @@
-"""Simulated and replayed shoes at the pace of their own stamps; live shoes as they come."""
+"""The session's clock, and the replay of simulated and recorded shoes at the rate of their own time stamps."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from smartshoe.devices import Block
 
 Number = TypeVar("Number", float, Array)
 
-SLICE_S = 0.02  # of the pace's time: a picture is drawn 30 to 60 times a second
+SLICE_S = 0.02  # host time covered by a slice; 30 to 60 frames are drawn a second
 
 
 @dataclass(frozen=True)
 class Pace:
     """The session's clock: seconds since its start, ``speed`` times as fast as the host's ``clock``.
 
-    ``begin_s`` is the host's time at the start. At another speed than 1 only recordings and simulations can be shown.
+    ``begin_s`` is the host's time at the start. Only recordings and simulations can be shown at another speed than 1.
     """
 
     clock: Callable[[], float]
@@ -29,19 +29,19 @@ class Pace:
     speed: float = 1.0
 
     def now_s(self) -> float:
-        """Seconds since the start."""
+        """Seconds since the start of the session."""
         return (self.clock() - self.begin_s) * self.speed
 
     def of_host(self, host_time_s: Number) -> Number:
-        """The same of a time, or times, of the host's clock."""
+        """Convert a time, or times, of the host's clock to seconds since the start of the session."""
         return (host_time_s - self.begin_s) * self.speed
 
 
 def paced(blocks: Iterator[Block], pace: Pace, first_s: float, stop: Event) -> Iterator[Block]:
-    """``blocks`` of a stream that has no clock of its own, in slices, each when its last sample is due.
+    """Yield ``blocks`` of a stream without a clock of its own in slices, each when its last sample is due.
 
-    A sample of the stream's time ``first_s`` is due at the session's start. Each slice carries the host's time at
-    which its samples were due, and that at which it was handed on.
+    A sample with the stream's time ``first_s`` is due at the start of the session. Each slice carries the host times at
+    which its samples were due, and the host time at which it was handed on. Ends when ``stop`` is set.
     """
     for block in blocks:
         due_s = block.time_s - first_s

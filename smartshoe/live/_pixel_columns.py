@@ -1,4 +1,4 @@
-"""Samples reduced to what a picture can show: the least and the greatest value in each column of pixels."""
+"""Reduces samples to what a plot can show: the smallest and the largest value in each column of pixels."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from smartshoe.arrays import Array, Integers
 
 @dataclass(frozen=True, eq=False)
 class PixelColumns:
-    """A signal's columns of pixels: ``place`` (n,), whose time is ``place`` times the columns' width.
+    """A signal in columns of pixels; ``place`` (n,) are the columns' numbers, that is, times divided by the width.
 
-    ``low`` and ``high`` (n, width) of the samples in it, NaN where all are missing. Columns without a sample are not
-    there.
+    ``low`` and ``high`` (n, width) are the extreme values of the samples in each column, NaN where all are missing.
+    Columns without samples are left out.
     """
 
     place: Integers
@@ -25,13 +25,13 @@ class PixelColumns:
         return int(self.place.size)
 
     def since(self, place: int) -> PixelColumns:
-        """From column ``place`` on."""
+        """The columns from number ``place`` on."""
         first = int(np.searchsorted(self.place, place))
         return PixelColumns(self.place[first:], self.low[first:], self.high[first:])
 
 
 def reduced(time_s: Array, rows: Array, width_s: float) -> PixelColumns:
-    """Rows (n, width) at rising times (n,), in columns of ``width_s``."""
+    """Reduce rows (n, width) at increasing times (n,) to columns that are ``width_s`` wide."""
     if not time_s.size:
         return PixelColumns(np.zeros(0, dtype=np.int64), np.zeros((0, rows.shape[1])), np.zeros((0, rows.shape[1])))
     places = np.floor(time_s / width_s).astype(np.int64)
@@ -42,7 +42,7 @@ def reduced(time_s: Array, rows: Array, width_s: float) -> PixelColumns:
 
 
 def joined(before: PixelColumns, after: PixelColumns, most: int) -> PixelColumns:
-    """Consecutive columns as one, the last ``most`` places of them; a column that both have part of is made whole."""
+    """Join consecutive columns and keep the last ``most``; a column that both sides have a part of is merged."""
     if not len(after):
         return before
     cut = len(before) - int(len(before) > 0 and before.place[-1] == after.place[0])

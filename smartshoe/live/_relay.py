@@ -1,4 +1,4 @@
-"""A shoe that a session reads, shown on a page as well: what is on disk is handed on, nothing waits for the page."""
+"""`RelayedShoe`: shows on a page a shoe that a session reads; the session never waits for the page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class RelayedShoe(Shoe):
-    """``shoe`` as its blocks are given on; a stream without a clock of its own goes by its own stamps."""
+    """Passes on the blocks of ``shoe`` that `give` receives; a stream without a clock uses its own time stamps."""
 
     def __init__(self, shoe: Shoe) -> None:
         super().__init__()
@@ -27,25 +27,25 @@ class RelayedShoe(Shoe):
         return str(self._shoe)
 
     def describe(self) -> tuple[ChannelDescription, ...]:
-        """The shoe's channels."""
+        """The channels of the shoe."""
         return self._shoe.describe()
 
     @property
     def sample_rate_hz(self) -> float:
-        """The shoe's."""
+        """The sample rate of the shoe."""
         return self._shoe.sample_rate_hz
 
     @property
     def device_clock(self) -> DeviceClock | None:
-        """The shoe's."""
+        """The clock of the shoe."""
         return self._shoe.device_clock
 
     def clock_s(self) -> float:
-        """The time that samples are shown on: the host's for a live shoe, else that of the last sample given."""
+        """The time for showing samples: the host's for a live shoe, otherwise that of the last sample given."""
         return time.perf_counter() if self._newest_s is None else self._newest_s
 
     def give(self, block: Block) -> None:
-        """Hand a block on; never waits."""
+        """Pass a block on; never waits."""
         if block.arrival_s is None:
             self._newest_s = float(block.time_s[-1])
             block = replace(block, host_time_s=block.time_s, arrival_s=block.time_s)

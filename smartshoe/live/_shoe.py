@@ -1,4 +1,4 @@
-"""One shoe as the page shows it: the last minute of its units, its feet's steps, its losses and its clock."""
+"""`LiveShoe`: one shoe as the page shows it, with its last minute of data, its steps, its losses and its clock."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from smartshoe.recording import REGIONS, Channel, Recording
 from smartshoe.runs.session.streaming import StreamedForces
 
 REFERENCE_S = 60.0
-KEPT_S = 62.0  # the longest trace on the page, and a little
-LEAST_SHARE = 0.04  # of a unit's range (readings) that a foot's load must vary by to be a step
-USUAL_RANGE = 50.0  # mbar, where a device does not say its range
+KEPT_S = 62.0  # a little more than the longest trace on the page
+LEAST_SHARE = 0.04  # of a unit's range: the smallest variation of a foot's load (in readings) that can be a step
+USUAL_RANGE = 50.0  # in mbar, for devices that do not report their range
 
 
 @dataclass(frozen=True)
 class LiveFoot:
-    """``side`` ('left', 'right' or ''), the columns of its units in the shoe's samples and their regions."""
+    """A foot: ``side`` ('left', 'right' or ''), its units' columns in the shoe's samples, and their regions."""
 
     side: str
     columns: tuple[int, ...]
@@ -35,7 +35,7 @@ class LiveFoot:
 
 
 def feet_of(names: Sequence[str]) -> tuple[LiveFoot, ...]:
-    """The feet whose units are among ``names``; a name that is no unit's of a shoe belongs to none."""
+    """The feet whose units are among ``names``; other names are ignored."""
     by_side: dict[str, list[int]] = {}
     for column, name in enumerate(names):
         side, _, region = name.rpartition("_")
@@ -49,7 +49,7 @@ def feet_of(names: Sequence[str]) -> tuple[LiveFoot, ...]:
 
 @dataclass(frozen=True)
 class FootNow:
-    """A foot at this moment: ``phase`` (None where not known), whole ``load``, centre of pressure or NaN."""
+    """A foot's current ``phase`` (None if unknown), whole ``load``, and centre of pressure (NaN if unknown)."""
 
     phase: int | None
     load: float
@@ -57,10 +57,10 @@ class FootNow:
 
 
 class LiveShoe:
-    """What came of one shoe so far, bounded; written by the shoe's thread, read by the server's.
+    """All that is shown of one shoe, in bounded memory; written by the shoe's thread, read by the server's.
 
-    ``samples`` are those that were handed on (and, while recording, are on disk); ``shown`` are forces in N of the
-    calibrated units and readings of the others, against the session's time.
+    ``samples`` counts the samples taken in (while recording, those that are on disk). Shown values are forces in N for
+    calibrated units and readings for the others, against the session's time.
     """
 
     def __init__(self, url: str, shoe: Shoe, calibrations: Sequence[Calibration]) -> None:
@@ -85,31 +85,32 @@ class LiveShoe:
         self._last = np.zeros(len(self.names))
         self._steps = [StepFollower(foot.regions, self._least(foot)) for foot in self.feet]
         self._lock = Lock()
-        self._last_times: tuple[float, float] | None = None  # of the last sample: the shoe's, the session's
+        self._last_times: tuple[float, float] | None = None  # of the last sample: the shoe's time and the session's
         self._written_s = -np.inf
         self.last_arrival_s = -np.inf
         self.newest_s = -np.inf
 
     @property
     def side(self) -> str:
-        """The foot that this shoe is, '' where it is none or both."""
+        """The foot that this shoe is on; '' if it has the units of both feet or of none."""
         sides = {foot.side for foot in self.feet}
         return sides.pop() if len(sides) == 1 else ""
 
     def _least(self, foot: LiveFoot) -> float:
+        """The smallest variation of a foot's load that can be a step, in the unit of its shown values."""
         if all(self.symbols[c] == "N" for c in foot.columns):
             return LEAST_LOAD_N
         ranges = [self.ranges[c] for c in foot.columns]
         return LEAST_SHARE * max([r[1] - r[0] for r in ranges if r is not None] or [USUAL_RANGE])
 
     def take(self, block: Block, session_s: Array, force_n: dict[str, Array]) -> list[tuple[str, GaitStep]]:
-        """Show a block's samples at ``session_s`` (n,); the steps in it, each with its foot's side."""
+        """Take in a block with session times ``session_s`` (n,); returns its steps, each with its foot's side."""
         columns = [
             force_n[name] if name in force_n else np.where(block.missing[:, k], np.nan, block.readings[:, k])
             for k, name in enumerate(self.names)
         ]
         shown = np.column_stack(columns)
-        # A corrected clock may set a sample a little before the last one: shown time does not turn back.
+        # A corrected clock may place a sample before the last one; shown time must not go back.
         session_s = np.maximum.accumulate(np.maximum(session_s, self.newest_s))
         with self._lock:
             self._shown.append(session_s, shown)
@@ -126,6 +127,7 @@ class LiveShoe:
         ]
 
     def _held(self, shown: Array) -> Array:
+        """The shown values (n, units) with missing ones replaced by the last present one."""
         whole = np.vstack([self._last, shown])
         there = np.isfinite(whole)
         index = np.maximum.accumulate(np.where(there, np.arange(len(whole))[:, None], 0), axis=0)
@@ -134,24 +136,24 @@ class LiveShoe:
         return held
 
     def follow_clock(self, block: Block, shift_s: float) -> None:
-        """Note a block's host time and how sure it is; its time is the shoe's own plus ``shift_s``."""
+        """Note a block's host time and its uncertainty; the block's time is the shoe's own plus ``shift_s``."""
         if block.host_time_s is None:
             return
         device_s, host_s = float(block.time_s[-1]), float(block.host_time_s[-1])
         clock = self.shoe.device_clock
-        if clock is None or clock.fit is None:  # the host's time was made from the stream's own
+        if clock is None or clock.fit is None:  # the host times were computed from the stream's own times
             self._reference_s = 0.0
             return
         self._sd_s, self._skew_ppm = float(clock.fit.sd_s(device_s - shift_s)), clock.fit.skew_ppm
         if self._first_s is None:
             self._first_s = float(block.time_s[0])
         if self._reference_s is None or device_s - self._first_s < REFERENCE_S:
-            # The first line is rough: a later one says better where it began.
+            # The first fits of the clock are rough; later ones give a better start time.
             self._reference_s = float(clock.host_time(self._first_s - shift_s)) - self._first_s
         self._offset_s = host_s - device_s - self._reference_s
 
     def clock_dict(self) -> dict[str, float | None]:
-        """How far the host's clock went from the shoe's since the first sample, one standard error, and the skew."""
+        """How far the host's clock has moved from the shoe's, its standard error, and the difference of the rates."""
         if self._reference_s is None:
             return {"offset_ms": None, "sd_ms": None, "skew_ppm": None}
         return {
@@ -161,13 +163,13 @@ class LiveShoe:
         }
 
     def since(self, place: int) -> tuple[int, Array, Array]:
-        """The place after the last sample, session times (n,) and shown values less the zero, from ``place`` on."""
+        """The number of the next sample, and from ``place`` on session times (n,) and shown values less their zero."""
         with self._lock:
             time_s, rows = self._shown.since(place)
             return self._shown.end, time_s, rows - self.zero
 
     def now(self) -> tuple[Array, list[FootNow]]:
-        """The last value (units,) of each unit, and each foot."""
+        """The last value (units,) of each unit, and the state of each foot."""
         values = self._last - self.zero
         feet = []
         for foot, follower in zip(self.feet, self._steps, strict=True):
@@ -183,12 +185,12 @@ class LiveShoe:
             return self._readings.after(float(times[-1]) - seconds) if times.size else self._readings.since(0)
 
     def shown_of_last(self, seconds: float) -> Array:
-        """Shown values (n, units), no zero taken off, of the last ``seconds``."""
+        """Shown values (n, units) of the last ``seconds``, without subtracting the zero."""
         with self._lock:
             return self._shown.after(self.newest_s - seconds)[1]
 
     def recording_of_last(self, seconds: float) -> Recording | None:
-        """The last ``seconds`` of readings as a recording; None before there are two samples."""
+        """The readings of the last ``seconds`` as a recording; None if there are fewer than two samples."""
         time_s, readings = self.readings_of_last(seconds)
         if time_s.size < 2:
             return None
@@ -198,23 +200,23 @@ class LiveShoe:
         return Recording(time_s, channels, name=self.side or "shoe")
 
     def set_zero(self, columns: Sequence[int], zeros: Array) -> None:
-        """Take ``zeros`` (c,) off what ``columns`` (c,) show from now on, in traces that are there already as well."""
+        """Subtract ``zeros`` (c,) from what ``columns`` (c,) show, also in the traces shown so far."""
         zero = self.zero.copy()
         zero[list(columns)] = zeros
         self.zero = zero
 
     def full_scale(self, column: int) -> float:
-        """Of a unit's reading: its range, or what such sensors have where the device does not say."""
+        """Full scale of a unit's reading: its range, or a usual one if the device does not report it."""
         range_ = self.ranges[column]
         return USUAL_RANGE if range_ is None else range_[1] - range_[0]
 
     def device_time_s(self, session_s: float) -> float | None:
-        """The shoe's time at a time of the session, by the last sample's two times; None before the first."""
+        """The shoe's time at a session time, extrapolated from the last sample; None before the first."""
         last = self._last_times
         return None if last is None else round(last[0] + (session_s - last[1]), 4)
 
     def on_session_time(self, block: Block, session_s: Array) -> Block:
-        """The block with the session's times in the place of its own, rising over blocks: two shoes on one clock."""
+        """The block with session times instead of its own, strictly increasing, so that two shoes share one clock."""
         rising = np.maximum.accumulate(np.concatenate([[self._written_s], session_s]))
         for k in np.flatnonzero(np.diff(rising) <= 0.0) + 1:
             rising[k] = np.nextafter(rising[k - 1], np.inf)
@@ -222,7 +224,7 @@ class LiveShoe:
         return replace(block, time_s=rising[1:])
 
     def to_dict(self) -> dict[str, Any]:
-        """For the page's state."""
+        """The shoe's part of the state that pages get."""
         return {
             "state": self.state,
             "samples": self.samples,
@@ -233,5 +235,5 @@ class LiveShoe:
 
 
 def lost_in(events: Sequence[ShoeEvent]) -> int:
-    """Samples that the device took and nobody got."""
+    """Number of samples that the device took but that never arrived."""
     return sum(e.lost if isinstance(e, Gap) else e.samples if isinstance(e, Dropped) else 0 for e in events)

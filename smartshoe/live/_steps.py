@@ -1,8 +1,8 @@
-"""A foot's contacts as they happen, for the eye: known at the sample, a little less exact than `smartshoe.gait`.
+"""`StepFollower`: a foot's events as they happen, for display; a little less exact than `smartshoe.gait`.
 
-`smartshoe.gait` looks at seconds on both sides of an edge before it tells; a page cannot wait. So thresholds are shares
-of the foot's own rise over its own floor, as there, but both are followed sample by sample. Numbers for a paper come
-from ``smartshoe gait`` on the recording.
+`smartshoe.gait` looks at seconds on both sides of an edge before it reports it; a page cannot wait. As there,
+thresholds are shares of the foot's own rise above its own floor, but both are tracked sample by sample. Numbers for
+publication come from ``smartshoe gait`` on the recording.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.gait.phases import FLAT, HEEL, PUSH, SWING
 
-ON, OFF = 0.08, 0.05  # of the rise: the foot bears above, has left below
-UNIT_ON, UNIT_OFF = 0.12, 0.06  # of the unit's own rise
-LEAST_UNIT = 0.03  # of the foot's rise: what a unit that bears next to nothing may drift by
-FOLLOW_S = 0.5  # how fast the floor follows what the unloaded foot reads
-FORGET_S = 60.0  # how fast the highest load is forgotten
+ON, OFF = 0.08, 0.05  # of the foot's rise: it is down above ON, and up below OFF
+UNIT_ON, UNIT_OFF = 0.12, 0.06  # of the unit's own rise: the same for a unit
+LEAST_UNIT = 0.03  # of the foot's rise: the drift of an almost unloaded unit that is ignored
+FOLLOW_S = 0.5  # time constant with which the floor follows the unloaded readings
+FORGET_S = 60.0  # time constant with which the highest load is forgotten
 APART_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class GaitStep:
-    """``event`` (heel_strike, foot_flat, heel_off, toe_off) of a foot at ``time_s``."""
+    """An ``event`` (heel_strike, foot_flat, heel_off, toe_off) of a foot at ``time_s``."""
 
     time_s: float
     event: str
@@ -34,14 +34,15 @@ class GaitStep:
 class StepFollower:
     """One foot's phase and events from its units' loads, sample by sample.
 
-    ``regions`` (r) are the units' places; ``least`` is what the foot's load must at least vary by, in the loads' unit.
+    ``regions`` (r) are the places of the units; ``least`` is the smallest variation of the foot's load that counts as a
+    step, in the unit of the loads.
     """
 
     def __init__(self, regions: Sequence[str], least: float) -> None:
         self.least = least
         self._heel = [k for k, region in enumerate(regions) if region == "heel"]
         self._fore = [k for k, region in enumerate(regions) if region != "heel"]
-        self._floor: list[float] | None = None  # of each unit, and of all together
+        self._floor: list[float] | None = None  # of each unit, and of their sum
         self._top: list[float] = []
         self._bears = [False] * len(regions)
         self._is_down = False
@@ -50,7 +51,7 @@ class StepFollower:
 
     @property
     def phase(self) -> int | None:
-        """An index into `smartshoe.gait.phases.PHASES`; None before the foot has borne a load."""
+        """The phase as an index into `smartshoe.gait.phases.PHASES`; None before the foot has borne a load."""
         if self._floor is None or self._top[-1] - self._floor[-1] < self.least:
             return None
         if not self._is_down:
@@ -70,6 +71,7 @@ class StepFollower:
         return found
 
     def _follow(self, at: float, values: list[float]) -> None:
+        """Update the floor and the highest load of each unit, and of their sum."""
         if self._floor is None:
             self._floor, self._top = list(values), list(values)
         passed_s = min(max(at - self._last_s, 0.0), FOLLOW_S)
@@ -84,6 +86,7 @@ class StepFollower:
             self._top[k] = value if value > top else top - (top - self._floor[k]) * passed_s / FORGET_S
 
     def _judged(self, at: float, values: list[float]) -> list[GaitStep]:
+        """Update which units bear load and whether the foot is down; returns the events at this sample."""
         assert self._floor is not None
         rise = self._top[-1] - self._floor[-1]
         share = (values[-1] - self._floor[-1]) / rise if rise >= max(self.least, 1e-9) else 0.0
@@ -98,6 +101,7 @@ class StepFollower:
         return self._within(at) if self._is_down else []
 
     def _within(self, at: float) -> list[GaitStep]:
+        """The events of a foot that stays down: foot flat and heel off, each once a stance."""
         if not self._heel:
             return []
         phase = self.phase

@@ -1,4 +1,4 @@
-"""The zero button: what each unloaded unit shows is its zero from then on; a loaded foot is refused."""
+"""The zero button: what each unloaded unit shows becomes its zero; a loaded foot is refused."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LOOKED_AT_S = 2.0
 
 
 def zeros_of(live: LiveShoe) -> Iterator[tuple[str, tuple[int, ...], Array | None]]:
-    """For each foot of the shoe a sentence, its columns, and what they show at rest; None where it is not at rest."""
+    """Yield for each foot a sentence, its columns, and their values at rest (c,), or None if it is not at rest."""
     time_s, readings = live.readings_of_last(LOOKED_AT_S)
     shown = live.shown_of_last(LOOKED_AT_S)
     for foot in live.feet:

@@ -1,4 +1,4 @@
-"""`PageOperator`: a calibration session's instructions, progress and readings on the live page, answers from it."""
+"""`PageOperator`: shows a calibration session on a live page, and takes answers from it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ JOIN_S = 10.0
 
 
 class _AnsweredError(Exception):
-    """The page has answered what the keyboard is waited for."""
+    """Raised to stop waiting for the keyboard, since the page has answered."""
 
 
 class PageOperator:
-    """What ``other`` is asked and shown, a page is as well; who ``asks`` takes the answer that comes first.
+    """An operator that shows on a page what ``other`` is asked and shown.
 
-    ``keyboard`` says that ``other`` waits for a person too. The page is there from the first sample on: ``ready`` is
-    called with its address. Use it in a with block.
+    With ``asks`` the page may answer, too; the answer that comes first counts. ``keyboard`` says that ``other`` waits
+    for a person as well. The page exists from the first sample on; ``ready`` is then called with its address. Use it as
+    a context manager.
     """
 
     def __init__(
@@ -51,17 +52,17 @@ class PageOperator:
         self.close()
 
     def streams(self, shoe: Shoe) -> None:
-        """From here on ``shoe`` is read."""
+        """Start to relay ``shoe``, which is read from here on."""
         self._other.streams(shoe)
         self._relay = RelayedShoe(shoe).open()
 
     def tell(self, sentence: str) -> None:
-        """On the page it stands until the next."""
+        """Show ``sentence`` on the page until the next one comes."""
         self._other.tell(sentence)
         self._say(sentence)
 
     def confirm(self, sentence: str, meanwhile: Callable[[], None]) -> None:
-        """By the page's button or at the keyboard, whichever comes first."""
+        """Wait until the page's button or the keyboard confirms, whichever comes first."""
         self._say(sentence)
         if not self._asks:
             self._other.confirm(sentence, meanwhile)
@@ -83,7 +84,7 @@ class PageOperator:
             self.task.settle()
 
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
-        """The traces, and how far the pressing is."""
+        """Pass a block on to the page, with the progress of the pressing; the first block opens the page."""
         self._other.show(block, experiment, elapsed_s)
         if self._relay is None:
             return
@@ -95,7 +96,7 @@ class PageOperator:
             self._session.changed()
 
     def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
-        """By the page's buttons where nobody is at the keyboard."""
+        """Whether to press again: asked by the page's buttons, unless somebody is at the keyboard."""
         self._say(finding.says)
         if not self._asks or self._keyboard or repeats_left == 0:
             return self._other.wants_repeat(finding, repeats_left)
@@ -107,7 +108,7 @@ class PageOperator:
         return wanted
 
     def close(self) -> None:
-        """End the page."""
+        """Stop the server and close the page's session."""
         if self._server is not None and self._thread is not None:
             self._server.stop()
             self._thread.join(JOIN_S)
@@ -117,6 +118,7 @@ class PageOperator:
         self._server = self._session = None
 
     def _begin(self, relay: RelayedShoe) -> None:
+        """Open the page: start its session and its server."""
         self._session = LiveSession({str(relay): relay}, clock=relay.clock_s)
         self._session.task = self.task
         self._server = LiveServer(self._session, port=self._port)

@@ -1,4 +1,4 @@
-"""The pages' server: one page, its health, and a websocket on which each page gets its pictures."""
+"""`LiveServer`: serves the live page, its health, and a websocket through which each open page gets its frames."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ END_WITHIN_S = 2
 
 
 class LiveServer:
-    """Serves ``session`` at ``host`` and ``port`` (0: a free one), with a ``token`` where it is not None."""
+    """Serves ``session`` at ``host`` and ``port`` (0 for a free one); requests need ``token`` unless it is None."""
 
     def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
         self.session = session
@@ -39,7 +39,7 @@ class LiveServer:
         self.host, self.port = host, int(self._socket.getsockname()[1])
         self._data = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._is_told = False
+        self._is_woken = False
         page, policy = document()
         headers = {
             "content-security-policy": policy,
@@ -74,26 +74,27 @@ class LiveServer:
 
     @property
     def url(self) -> str:
-        """The page's address."""
+        """The address of the page."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/"
 
     def run(self, ready: Callable[[], None] = lambda: None) -> None:
-        """Serve until `stop`, or SIGINT or SIGTERM in the main thread; ``ready`` is called once, at first."""
+        """Serve until `stop`, or SIGINT or SIGTERM in the main thread; ``ready`` is called once at the start."""
         asyncio.run(self._serve(ready))
 
     def stop(self) -> None:
-        """End `run`, from any thread."""
+        """Make `run` end; may be called from any thread."""
         self._server.should_exit = True
 
     def close(self) -> None:
-        """Let go of the port, where `run` was never called."""
+        """Release the port if `run` was never called."""
         self._socket.close()
 
     async def _serve(self, ready: Callable[[], None]) -> None:
+        """Run the server and wake its pages until it is stopped."""
         self._loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
-            # Elsewhere than in the main thread, and on Windows, there is no such handler: Ctrl-C raises there.
+            # In other threads and on Windows there is no such handler; there Ctrl-C raises KeyboardInterrupt.
             with contextlib.suppress(RuntimeError, ValueError, NotImplementedError):
                 self._loop.add_signal_handler(number, self.stop)
         self.session.changed = self._changed
@@ -107,23 +108,25 @@ class LiveServer:
             self._socket.close()
 
     def _changed(self) -> None:
-        if not self._is_told and self._loop is not None:
-            self._is_told = True
+        """Wake the pages' loop, from any thread; once until it has run."""
+        if not self._is_woken and self._loop is not None:
+            self._is_woken = True
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(self._data.set)
 
     async def _tick(self) -> None:
-        """Wake the pages when there are new samples, 60 times a second at most and 30 times at least."""
+        """Wake the pages for new samples, at most 60 and at least 30 times a second."""
         while True:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._data.wait(), IDLE_FRAME_S)
             self._data.clear()
-            self._is_told = False
+            self._is_woken = False
             for client in self.desk.clients:
                 client.wake.set()
             await asyncio.sleep(FRAME_S)
 
     async def _page(self, websocket: WebSocket) -> None:
+        """Serve one page's websocket until either side ends it."""
         if len(self.desk.clients) >= MOST_CLIENTS:
             await websocket.close(1013)
             return
@@ -132,8 +135,8 @@ class LiveServer:
         self.desk.clients.add(client)
         try:
             async with asyncio.TaskGroup() as tasks:
-                tasks.create_task(_sent(client, websocket))
-                tasks.create_task(_received(client, websocket))
+                tasks.create_task(_send(client, websocket))
+                tasks.create_task(_receive(client, websocket))
         except* (_OverError, WebSocketDisconnect, OSError):
             pass
         finally:
@@ -141,15 +144,16 @@ class LiveServer:
 
 
 class _OverError(Exception):
-    """The page is gone: end its other half."""
+    """Raised when a page has gone, to end the other task of its connection."""
 
 
-async def _sent(client: Client, websocket: WebSocket) -> None:
+async def _send(client: Client, websocket: WebSocket) -> None:
+    """Send the page its messages and frames whenever it is woken."""
     await websocket.send_text(json.dumps(client.hello(), allow_nan=False))
     while True:
         await client.wake.wait()
         client.wake.clear()
-        # Each send waits until a slow page has taken what it was sent: what it misses meanwhile is in the next frame.
+        # Each send waits until a slow page has taken it; what the page misses meanwhile is in its next frame.
         for text in client.news():
             await websocket.send_text(text)
         frame = client.frame()
@@ -157,7 +161,8 @@ async def _sent(client: Client, websocket: WebSocket) -> None:
             await websocket.send_bytes(frame)
 
 
-async def _received(client: Client, websocket: WebSocket) -> None:
+async def _receive(client: Client, websocket: WebSocket) -> None:
+    """Take the page's messages until it disconnects."""
     while True:
         message = await websocket.receive()
         if message["type"] == "websocket.disconnect":
@@ -169,7 +174,7 @@ async def _received(client: Client, websocket: WebSocket) -> None:
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's, without its signal handlers: they would raise the signal again after a clean end."""
+    """A uvicorn server without its own signal handlers, which would raise the signal again after a clean end."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -177,6 +182,7 @@ class _Server(uvicorn.Server):
 
 
 def _listening(host: str, port: int) -> socket.socket:
+    """A socket that listens at the address; raises `UsageError` if it cannot."""
     made = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -1,4 +1,4 @@
-"""`LiveSession`: the shoes of one page, what is recorded of them, what was noted; all that pages show and ask for."""
+"""`LiveSession`: the shoes of a live page, their recording, and the notes; everything that pages show and ask for."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from smartshoe.live._zeroing import zeros_of
 
 NOTES_KEPT, STEPS_KEPT = 500, 400
 LONGEST_WORD = 80
-LONGEST_AGE_S = 120.0  # of a mark whose word was typed after its moment
+LONGEST_AGE_S = 120.0  # largest delay of a mark, whose word is typed after the moment it marks
 
 
 class LiveSession:
     """Open shoes, shown until `close`. ``changed`` is called, from any thread, when there is something new to show.
 
-    ``calibrations`` are of any of the shoes' units. ``record`` is the file to record to from the start; without it the
-    page's button records to a file named by date and time in the working folder. ``lsl`` opens an outlet for each shoe
-    on the Lab Streaming Layer.
+    ``calibrations`` are for any of the shoes' units. ``record`` is the file to record to from the start; without it the
+    page's button records to a file in the working folder, named by date and time. ``lsl`` opens an outlet on the Lab
+    Streaming Layer for each shoe.
     """
 
     def __init__(
@@ -52,12 +52,12 @@ class LiveSession:
         self.changed = changed
         self.began = datetime.datetime.now(datetime.UTC)
         self.pace = Pace(clock, clock(), speed)
-        self.shoes = [LiveShoe(url, shoe, _of(shoe, calibrations)) for url, shoe in shoes.items()]
+        self.shoes = [LiveShoe(url, shoe, _calibrations_of(shoe, calibrations)) for url, shoe in shoes.items()]
         _require_all_used(self.shoes, calibrations)
         _require_distinct(self.shoes)
         self.recording: recorder.LiveRecording | None = None
-        self.recorded: str | None = None  # what the last recording came to
-        self.task: Guidance | None = None  # of a calibration session that this page shows
+        self.recorded: str | None = None  # summary of the last recording
+        self.task: Guidance | None = None  # of the calibration session that this page shows, if any
         self._file = record
         self._outlets = [Outlet(live, clock()) for live in self.shoes] if lsl else []
         self._lock = RLock()
@@ -69,9 +69,9 @@ class LiveSession:
         ]
 
     def start(self) -> None:
-        """Begin to record and to read; streams without a clock of their own begin together, by their own stamps.
+        """Start recording and reading; streams without a clock of their own start together, by their own time stamps.
 
-        Raises `UsageError` where the file is there already or a live shoe is to go at another speed than its own.
+        Raises `UsageError` if the file exists already, or if a live shoe is asked for at another speed than 1.
         """
         firsts = [source.first_s() for source in self._sources]
         if self.pace.speed != 1.0 and None in firsts:
@@ -84,13 +84,14 @@ class LiveSession:
             source.start(self.pace, None if first is None else zero_s)
 
     def close(self) -> None:
-        """End reading, then the recording; raises `InputError` where the disk did not take all of it."""
+        """Stop reading, then recording; raises `InputError` if not all data could be written."""
         for source in self._sources:
             source.close()
         self._outlets = []
         self.stop_recording()
 
     def _taker(self, index: int) -> Callable[[Block], None]:
+        """The function that takes in the blocks of one shoe."""
         live = self.shoes[index]
 
         def take(block: Block) -> None:
@@ -116,6 +117,8 @@ class LiveSession:
         return take
 
     def _teller(self, index: int) -> Callable[[ShoeEvent], None]:
+        """The function that notes the events of one shoe."""
+
         def tell(event: ShoeEvent) -> None:
             live = self.shoes[index]
             live.lost += lost_in([event])
@@ -124,6 +127,8 @@ class LiveSession:
         return tell
 
     def _failer(self, index: int) -> Callable[[str], None]:
+        """The function that notes that a shoe's reading has failed."""
+
         def fail(says: str) -> None:
             self.shoes[index].state = "failed"
             self.note("failed", says, shoe=index)
@@ -131,14 +136,14 @@ class LiveSession:
         return fail
 
     def now_s(self) -> float:
-        """The picture's right edge: now, or the last sample's time once every shoe is at its end."""
+        """The time at the right edge of the traces: now, or that of the last sample once all shoes have ended."""
         now_s = self.pace.now_s()
         if any(live.state != "over" for live in self.shoes):
             return now_s
         return min(now_s, max(live.newest_s for live in self.shoes))
 
     def note(self, kind: str, says: str, *, shoe: int | None = None, at_s: float | None = None) -> dict[str, Any]:
-        """Add a note (and write it down while recording); it is shown on every page."""
+        """Add a note, which every page shows, and write it to the recording if there is one."""
         now_s = self.pace.now_s() if at_s is None else at_s
         note: dict[str, Any] = {"time_s": round(now_s, 4), "kind": kind, "says": says, "shoe": shoe}
         with self._lock:
@@ -151,18 +156,18 @@ class LiveSession:
         return note
 
     def news(self, noted: int, stepped: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-        """Notes and steps beyond the first ``noted`` and ``stepped`` ever, as far as they are kept."""
+        """The notes and steps after the first ``noted`` and ``stepped``, as far as they are still held."""
         with self._lock:
             notes, steps = self.noted - noted, self.stepped - stepped
             return (list(self.notes)[-notes:] if notes else []), (list(self.steps)[-steps:] if steps else [])
 
     def mark(self, word: str, age_s: float = 0.0) -> dict[str, Any]:
-        """A mark ``age_s`` ago, with a word of a person's."""
+        """Add a mark at ``age_s`` before now, with a word that a person typed."""
         clean = " ".join("".join(c if c.isprintable() else " " for c in word).split())[:LONGEST_WORD] or "mark"
         return self.note("mark", clean, at_s=self.pace.now_s() - min(max(age_s, 0.0), LONGEST_AGE_S) * self.pace.speed)
 
     def set_zero(self) -> list[dict[str, Any]]:
-        """Take what the unloaded units show as their zero, foot by foot; a note says of each foot whether it was."""
+        """Make what the unloaded units show their zero, foot by foot; returns a note for each foot."""
         notes = []
         for index, live in enumerate(self.shoes):
             for says, columns, zeros in zeros_of(live):
@@ -172,7 +177,7 @@ class LiveSession:
         return notes
 
     def start_recording(self) -> Path:
-        """Record from now on; the file. Raises `UsageError` where it cannot be made."""
+        """Start recording and return the file; raises `UsageError` if it cannot be created."""
         if self.recording is not None:
             return self.recording.path
         stem = self._file or Path(f"live_{datetime.datetime.now():%Y%m%d_%H%M%S}.csv")
@@ -182,7 +187,7 @@ class LiveSession:
         return path
 
     def stop_recording(self) -> None:
-        """End the recording, if there is one; raises `InputError` where the disk did not take all of it."""
+        """End the recording, if there is one; raises `InputError` if not all data could be written."""
         if self.recording is None:
             return
         self.note("recorded", f"{self.recording.path.name} ends here")
@@ -193,6 +198,7 @@ class LiveSession:
         self.changed()
 
     def _begin_from_start(self, record: Path) -> None:
+        """Record from the start; after an interrupted recording show its notes and use a new file."""
         left = recorder.interrupted_at(record, self._sides())
         path = record
         if left is not None:
@@ -205,6 +211,7 @@ class LiveSession:
             self.note("resumed", f"{left.says}; this goes on in {path.name}")
 
     def _record_to(self, path: Path) -> None:
+        """Start a recording with a table for each shoe."""
         several = len(self.shoes) > 1
         layouts = [
             recorder.Layout(
@@ -239,7 +246,7 @@ class LiveSession:
         self.note("failed", says)
 
     def health(self, clients: int) -> dict[str, Any]:
-        """The contract's object (section 9), with each shoe's own numbers beside."""
+        """The state of the session in schema smartshoe.live/1, with each shoe's own numbers."""
         first = self.shoes[0]
         recording = self.recording
         return {
@@ -254,12 +261,14 @@ class LiveSession:
         }
 
 
-def _of(shoe: Shoe, calibrations: Sequence[Calibration]) -> list[Calibration]:
+def _calibrations_of(shoe: Shoe, calibrations: Sequence[Calibration]) -> list[Calibration]:
+    """The calibrations of a shoe's units."""
     names = {channel.name for channel in shoe.describe()}
     return [calibration for calibration in calibrations if calibration.unit in names]
 
 
 def _require_all_used(shoes: Sequence[LiveShoe], calibrations: Sequence[Calibration]) -> None:
+    """Raise `UsageError` for a calibration that fits no unit of the shoes."""
     names = [name for live in shoes for name in live.names]
     for calibration in calibrations:
         if calibration.unit not in names:
@@ -270,6 +279,7 @@ def _require_all_used(shoes: Sequence[LiveShoe], calibrations: Sequence[Calibrat
 
 
 def _require_distinct(shoes: Sequence[LiveShoe]) -> None:
+    """Raise `UsageError` if two shoes have a unit of the same name."""
     seen: dict[str, LiveShoe] = {}
     for live in shoes:
         for name in live.names:

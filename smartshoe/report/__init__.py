@@ -1,1 +1,1 @@
-"""What a person sees: tables for a terminal, figures, and one self-contained HTML page."""
+"""Results for a person: tables for a terminal, figures, and self-contained HTML pages."""

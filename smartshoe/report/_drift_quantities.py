@@ -1,4 +1,4 @@
-"""Which quantities of a unit's drift are drawn, under which title, on what scale at least."""
+"""The quantities of a unit's drift that are drawn, their titles, and their smallest scale."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ TITLES = {
     "b0": "fast gain b0",
     "zero": "zero (reading at no load)",
 }
-LEAST_SPAN = 0.004  # of a parameter's size: so that a still one looks still
+LEAST_SPAN = 0.004  # of a parameter's size: smallest span of its axis, so that a constant parameter looks constant
 
 
 def shown_names(drift: Drift) -> list[str]:
-    """The quantities that are drawn, in their order."""
+    """The names of the quantities that are drawn, in their order."""
     return [name for name in SHOWN if name in drift.trends] + [n for n in drift.trends if n not in SHOWN and n != "c"]

@@ -1,4 +1,4 @@
-"""Charts as numbers: what a page draws, reduced to a budget and packed for the browser."""
+"""Charts as numbers: what a page draws, reduced to a size limit and packed for the browser."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from smartshoe.arrays import Array, Index
 
 Style = Literal["line", "dashed", "points"]
 
-PAGE_BYTES = 620_000  # of packed numbers on one page, so that page, script and texts stay under a megabyte
-FEWEST_POINTS = 400  # of a line, however many charts share a page
+PAGE_BYTES = 620_000  # limit for the packed numbers of a page, which keeps the whole page under a megabyte
+FEWEST_POINTS = 400  # that a line keeps, however many charts share a page
 BYTES_OF_X, BYTES_OF_Y, BASE64 = 4, 2, 4 / 3
-STEPS = 65_000  # of a line's range in its 16-bit numbers
+STEPS = 65_000  # into which a line's range is divided by its 16-bit numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
     """One line of a chart: ``values`` (n,) over the chart's x; NaN leaves a gap.
 
-    ``colour`` is the name of a colour of the page's style. ``low`` and ``high`` (n,) draw a band about a line and
-    error bars about points.
+    ``colour`` is the name of a colour in the page's style. ``low`` and ``high`` (n,) draw a band around a line, or
+    error bars on points.
     """
 
     label: str
@@ -39,7 +39,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Lines over one vertical scale; ``limits`` fixes it, so that charts beside each other compare."""
+    """Lines on one vertical scale; ``limits`` fixes it, so that neighbouring charts can be compared."""
 
     label: str
     lines: Sequence[Line]
@@ -49,7 +49,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A span ``start`` to ``end`` of x that is shaded; one line where both are equal."""
+    """A shaded span from ``start`` to ``end`` of x; a single line if the two are equal."""
 
     start: float
     end: float
@@ -59,12 +59,12 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Panels under each other over one ``x`` (n,), ascending.
+    """Panels below each other over a common ``x`` (n,), ascending.
 
-    ``says`` tells in words what is to be seen: it is the text for those who do not see it. Charts of one ``group``
-    share cursor and zoom. ``dates``: x is in seconds since 1970.
-    ``window`` is what is seen of x at first, all where it is None; its samples stay whole where they fit.
-    ``weight`` is the chart's part of the page's numbers, where the others have 1.
+    ``says`` tells in words what can be seen, also for readers who cannot see it. Charts of one ``group`` share cursor
+    and zoom. With ``dates``, x is in seconds since 1970. ``window`` is the part of x shown at first, None for all; its
+    samples are all kept if they fit. ``weight`` is the chart's share of the page's numbers, relative to 1 for the
+    others.
     """
 
     title: str
@@ -86,13 +86,13 @@ class Chart:
 
     @property
     def bytes_of_point(self) -> float:
-        """What one x and all that stands over it takes on the page."""
+        """Number of bytes that one point takes on the page: its x, and the value and band of every line."""
         columns = sum(1 + (line.low is not None) + (line.high is not None) for line in self.lines)
         return (BYTES_OF_X + BYTES_OF_Y * columns) * BASE64
 
 
 def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
-    """Indices of at most about ``most`` samples that keep each segment's extremes of every signal."""
+    """Indices (k,), at most about ``most``, of samples that keep the extremes of every signal in each segment."""
     if x.size <= most:
         return np.arange(x.size)
     block = -(-x.size * 2 * len(signals) // most)
@@ -100,7 +100,7 @@ def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
     start = np.arange(count) * block
     chosen = [np.array([0, x.size - 1])]
     for signal in signals:
-        # The last segment may be shorter than the others: its end stands in for what it lacks.
+        # The last segment may be shorter than the others; it is padded with its last value.
         filled = np.pad(np.where(np.isfinite(signal), signal, 0.0), (0, count * block - x.size), mode="edge")
         cut = filled.reshape(count, block)
         chosen += [start + cut.argmin(axis=1), start + cut.argmax(axis=1)]
@@ -108,7 +108,7 @@ def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
 
 
 def shares(charts: Sequence[Chart], page_bytes: float = PAGE_BYTES) -> list[int]:
-    """How many points each chart may keep, by weight: those that need less leave the rest to the others."""
+    """The number of points that each chart may keep, by weight; what one chart does not need is left to the others."""
     allowed = [0] * len(charts)
     left, weights = page_bytes, sum(chart.weight for chart in charts)
     order = sorted(range(len(charts)), key=lambda k: charts[k].x.size * charts[k].bytes_of_point / charts[k].weight)
@@ -120,8 +120,8 @@ def shares(charts: Sequence[Chart], page_bytes: float = PAGE_BYTES) -> list[int]
     return allowed
 
 
-def _kept(chart: Chart, most: int) -> NDArray[np.intp]:
-    """Indices of about ``most`` samples: extremes, and all in the window where those are at most half of that."""
+def _kept_indices(chart: Chart, most: int) -> NDArray[np.intp]:
+    """Indices of about ``most`` samples: the extremes, and all in the window if they are at most half of these."""
     signals = [line.values for line in chart.lines]
     if chart.window is not None and chart.x.size > most:
         first, last = np.searchsorted(chart.x, chart.window)
@@ -136,7 +136,7 @@ def _text(values: NDArray[Any]) -> str:
 
 
 def _packed(values: Array) -> dict[str, Any]:
-    """(n,) as 16-bit steps over its range; the lowest integer marks what is missing."""
+    """Values (n,) as 16-bit steps over their range; the lowest integer marks missing ones."""
     there = np.isfinite(values)
     low, high = (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
     step = (high - low) / STEPS or 1.0
@@ -156,8 +156,8 @@ def _line(line: Line, index: Index) -> dict[str, Any]:
 
 
 def packed(chart: Chart, most: int) -> dict[str, Any]:
-    """The chart as the page's script reads it, with at most about ``most`` points."""
-    index = _kept(chart, most)
+    """The chart as an object for the page's script, with about ``most`` points at most."""
+    index = _kept_indices(chart, most)
     x0 = float(chart.x[0]) if chart.x.size else 0.0
     return {
         "title": chart.title,
@@ -183,7 +183,7 @@ def packed(chart: Chart, most: int) -> dict[str, Any]:
 
 
 def script_text(charts: Sequence[Chart]) -> str:
-    """All charts as JSON that may stand inside a script element."""
+    """All charts as JSON that is safe inside a script element."""
     allowed = shares(charts)
     text = json.dumps([packed(c, most) for c, most in zip(charts, allowed, strict=True)], allow_nan=False)
     return text.replace("<", "\\u003c")

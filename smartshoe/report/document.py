@@ -1,4 +1,4 @@
-"""One self-contained HTML file: style, script, charts as numbers, nothing from elsewhere."""
+"""Writes a self-contained HTML file with its style, script and charts as numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from smartshoe.report.wording import sentence, words
 
 @functools.cache
 def _uplot(name: str) -> Markup:
-    """A file of the uplot-python package; the package itself would load IPython with it."""
+    """A file of the uplot-python package, read directly, since importing the package would load IPython."""
     spec = importlib.util.find_spec("uplot")
     for place in (spec.submodule_search_locations or ()) if spec is not None else ():
         path = Path(place) / "static" / name
@@ -39,7 +39,7 @@ def _environment() -> Environment:
 
 
 def render(template: str, facts: Mapping[str, Any]) -> str:
-    """The page's text. The template places a chart by ``figure(place, chart)``; its numbers follow at the end."""
+    """The text of the page. The template places a chart by ``figure(place, chart)``; the numbers follow at the end."""
     charts: list[Chart] = []
 
     def place(chart: Chart) -> int:
@@ -65,13 +65,13 @@ def render(template: str, facts: Mapping[str, Any]) -> str:
 
 
 def write_document(path: Path, template: str, facts: Mapping[str, Any]) -> Path:
-    """Write the page to ``path``, whole or not at all, and return it."""
+    """Write the page to ``path``, completely or not at all, and return the path."""
     write_text(path, render(template, facts))
     return path
 
 
 def polylines(curves: Sequence[tuple[str, Sequence[tuple[float, float]]]], width: float, height: float) -> Markup:
-    """A drawing without axes, ``width`` by ``height``: (class, points) in units of the drawing, y upwards."""
+    """An SVG drawing of curves without axes, ``width`` by ``height``: each is (class, points), with y upwards."""
     made = [
         Markup('<polyline class="{}" points="{}"/>').format(
             name, " ".join(f"{x:.1f},{height - y:.1f}" for x, y in points)

@@ -1,4 +1,4 @@
-"""A unit's life as a page: its parameters at each calibration, the trend, repairs and jumps."""
+"""The history of a unit as a page and on a terminal: its parameters at each calibration, trend, repairs and jumps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DAY_S = 86400.0
 
 
 def _chart(drift: Drift, trend: Trend) -> Chart:
-    """A quantity against the date; between two levels of the trend a gap, so that no line joins them."""
+    """A quantity against the date, with a gap between two levels of the trend, so that no line joins them."""
     start_s = drift.entries[0].date.timestamp()
     x: list[float] = []
     values: list[float] = []
@@ -60,7 +60,7 @@ def _chart(drift: Drift, trend: Trend) -> Chart:
 
 
 def newtons_a_year(drift: Drift) -> dict[str, tuple[float, float, float]]:
-    """What gain and zero moved in newtons a year, with the 95 % interval; where the slope is known."""
+    """Change of gain and zero in newtons a year, with the 95 % interval; only where the slope is known."""
     gain = drift.trends.get(STATIC_GAIN)
     if gain is None:
         return {}
@@ -76,7 +76,7 @@ def newtons_a_year(drift: Drift) -> dict[str, tuple[float, float, float]]:
 
 
 def headline(drift: Drift) -> tuple[str, str]:
-    """The unit's grade (good, look) and one sentence: what moved most, in newtons."""
+    """The unit's grade (good, look) and one sentence about what changed most, in newtons."""
     moved = newtons_a_year(drift)
     jumps = any(trend.jumps for trend in drift.trends.values())
     if not moved:
@@ -94,7 +94,7 @@ def headline(drift: Drift) -> tuple[str, str]:
 
 
 def _jumps(drift: Drift) -> str:
-    """The jump that is largest for its size, in newtons where it is the gain's or the zero's."""
+    """A sentence on the jump that is largest relative to its quantity, in newtons if it is one of the gain."""
     found = [(abs(jump.change.value) / max(float(np.abs(trend.values).mean()), 1e-12), trend, jump)
              for trend in drift.trends.values() for jump in trend.jumps]  # fmt: skip
     gains = [(share, trend, jump) for share, trend, jump in found if trend.name == STATIC_GAIN]
@@ -106,7 +106,7 @@ def _jumps(drift: Drift) -> str:
 
 
 def write_drift(folder: Path | str, drift: Drift, figures: str | None = None) -> dict[str, Path]:
-    """Write drift.html and drift.json, and drift.svg (pdf, png) where ``figures`` asks for it; returns their paths."""
+    """Write drift.html and drift.json, and with ``figures`` drift.svg (or pdf, png); returns the paths."""
     target = make_folder(folder)
     grade, says = headline(drift)
     written = {"report": target / "drift.html", "result": target / "drift.json"}
@@ -128,7 +128,7 @@ def write_drift(folder: Path | str, drift: Drift, figures: str | None = None) ->
 
 
 def _happened(drift: Drift) -> list[tuple[str, str, str]]:
-    """Calibrations and events by date: (date, what, note)."""
+    """Calibrations and events in order of date, as (date, what, note)."""
     rows = [
         (entry.date, f"calibrated{f' at {entry.position}' if entry.position else ''}: {entry.name}", entry.note)
         for entry in drift.entries
@@ -138,7 +138,7 @@ def _happened(drift: Drift) -> list[tuple[str, str, str]]:
 
 
 def print_drift(drift: Drift) -> None:
-    """One row a quantity: where it stands, its slope a year, what repairs changed."""
+    """Print one row for each quantity: first and last value, slope a year, and changes by repairs."""
     table = table_of(
         f"unit {drift.serial_number}: {len(drift.entries)} calibrations, {iso(drift.entries[0].date)} to"
         f" {iso(drift.entries[-1].date)}",
@@ -176,7 +176,7 @@ def print_drift(drift: Drift) -> None:
 
 
 def print_comparison(result: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Parameters of two calibrations side by side, and the force difference per loading rate."""
+    """Print the parameters of two calibrations side by side, and the force difference at each loading rate."""
     table = table_of(f"{names[0]} against {names[1]}", ["parameter", "first", "second", "difference", "%", "in sd"])
     for name, item in result["parameters"].items():
         table.add_row(

@@ -1,4 +1,4 @@
-"""Numbers as a person reads them: as many digits as the error bar allows."""
+"""Numbers for a person to read, with as many digits as the error bar justifies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def plain(value: float | None, digits: int = 3) -> str:
-    """``value`` to ``digits`` significant digits; a dash where there is none."""
+    """``value`` with ``digits`` significant digits; a dash if it is None or not finite."""
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0:
@@ -18,12 +18,12 @@ def plain(value: float | None, digits: int = 3) -> str:
 
 
 def with_unit(number: str, unit: str) -> str:
-    """A number and its unit; of a reading without one the number alone."""
+    """A number with its unit; without the unit if that is "1"."""
     return number if unit == "1" else f"{number} {unit}"
 
 
 def with_sd(parameter: Mapping[str, Any]) -> str:
-    """``value ± sd``, both to the sd's two leading digits."""
+    """``value ± sd``, both rounded to the two leading digits of the sd."""
     value, sd = parameter.get("value"), parameter.get("sd")
     if value is None:
         return "–"

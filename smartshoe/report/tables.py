@@ -1,4 +1,4 @@
-"""Tables on a terminal, from the same objects that ``--json`` writes."""
+"""Tables on a terminal, made from the objects that ``--json`` writes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rich.table import Table
 
 from smartshoe.report.numbers import plain, with_sd
 
-USUAL, NARROWEST = 120, 40  # characters
+USUAL, NARROWEST = 120, 40  # widths in characters
 
 
 def new_console() -> Console:
-    """A console as wide as the terminal, or as ``COLUMNS`` says in a pipe: 120 where it says nothing."""
-    # Without markup: names from files may look like it.
+    """A console as wide as the terminal; in a pipe as wide as ``COLUMNS``, or 120 characters."""
+    # Without markup, since names of files may look like it.
     console = Console(highlight=False, markup=False)
     if console.is_terminal:
         return console
@@ -27,19 +27,19 @@ def new_console() -> Console:
 
 
 def table_of(title: str, columns: Sequence[str]) -> Table:
-    """An empty table with a title on the left, numbers right-aligned."""
+    """An empty table with a title on the left; all columns but the first are right-aligned."""
     table = Table(
         title=title, title_justify="left", header_style="bold", box=box.SIMPLE_HEAD, show_edge=False, padding=0
     )
     for index, column in enumerate(columns):
         longest = max((len(line) for line in column.splitlines()), default=1)
-        # Folded, never cut: what does not fit the line goes on in the next.
+        # Cells are folded, never cut: what does not fit continues on the next line.
         table.add_column(column, min_width=longest, justify="left" if index == 0 else "right", overflow="fold")
     return table
 
 
 def print_identification(result: Mapping[str, Any]) -> None:
-    """The parameters with error bars, the fit and its tests."""
+    """Print the parameters with error bars, the fit and its tests."""
     table = table_of(
         f"{result.get('unit') or 'unit'}: {result['direction']} fit by {result['method']},"
         f" {result['estimator'].replace('_', ' ')}",
@@ -80,7 +80,7 @@ def print_identification(result: Mapping[str, Any]) -> None:
 
 
 def print_validation(result: Mapping[str, Any], *, is_diagnosed: bool = False) -> None:
-    """Errors per loading rate; ``is_diagnosed``: of a diagnosis's calibration."""
+    """Print the errors at each loading rate; ``is_diagnosed`` means that the calibration comes from a diagnosis."""
     table = table_of(
         f"{result.get('unit') or 'unit'}: errors in N over {plain(result['full_scale_n'])} N; loops in % of it",
         ["rate\nN/s", "cycles", "raw", "static", "comp.", "P %", "vs\nstat. %", "loop\nraw", "loop\ncomp.",
@@ -114,9 +114,9 @@ def print_validation(result: Mapping[str, Any], *, is_diagnosed: bool = False) -
 
 
 def worse_than_a_line(overall: Mapping[str, Any], *, is_diagnosed: bool = False) -> str | None:
-    """A sentence where the filter leaves more than the best static line does; else None.
+    """A sentence if the filter's error is larger than that of the best static line; None otherwise.
 
-    ``is_diagnosed``: the calibration is a diagnosis's, so that another would say nothing new.
+    ``is_diagnosed`` means that the calibration comes from a diagnosis, so that another one would not help.
     """
     static_n, left_n = overall["rmse_static_n"], overall["rmse_compensated_n"]
     if static_n is None or left_n is None or left_n <= static_n:
@@ -129,7 +129,7 @@ def worse_than_a_line(overall: Mapping[str, Any], *, is_diagnosed: bool = False)
 
 
 def print_summary(units: Sequence[Mapping[str, Any]], headline: str, grades: Mapping[str, str]) -> None:
-    """A scenario's result: the verdict, and for each unit its grade (by name), its errors and its parameters."""
+    """Print a scenario's result: the verdict, and each unit's grade (by name), errors and parameters."""
     console = new_console()
     console.print(headline, style="bold", soft_wrap=True)
     errors = table_of(

@@ -1,4 +1,4 @@
-"""A scenario's trial on the report's page and on a terminal: raw and corrected forces beside the truth."""
+"""A scenario's trial on the report's page and on a terminal: raw and corrected forces compared with the truth."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
 
 COLUMNS = ("truth", "raw", "corrected")
-WEIGHT = 8.0  # of the trial on the page of its calibrations: minutes, beside their pressings
+WEIGHT = 8.0  # of the trial's chart: it lasts minutes and needs more points than the pressings on the page
 
 
 @dataclass(frozen=True, eq=False)
 class TrialSection:
     """What the page shows of a trial.
 
-    Numbers against the truth (label and one text each of `COLUMNS`), sentences, charts, and where the trial's own page
-    lies (relative to the report).
+    ``rows`` are figures compared with the truth (a label, and a text for each of `COLUMNS`), ``notes`` are sentences,
+    and ``page`` is the path of the trial's own page relative to the report.
     """
 
     name: str
@@ -43,7 +43,7 @@ def section(
 
 
 def verdict(result: Mapping[str, Any]) -> str:
-    """One sentence: what was done, and how near the corrected total comes."""
+    """One sentence: what was done, and how close the corrected total is to the truth."""
     gait, against = result["gait"], result["against_truth"]
     said = f"{gait['activity'].capitalize()}, {result['duration_s']:.0f} s"
     if against is None:
@@ -61,7 +61,7 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 
 def rows(result: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
-    """Label and texts by `COLUMNS`; empty where the truth is not known."""
+    """Labels, each with its texts by `COLUMNS`; empty if the truth is unknown."""
     against = result["against_truth"]
     if against is None:
         return []
@@ -85,7 +85,7 @@ def rows(result: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
 
 
 def notes(result: Mapping[str, Any]) -> list[str]:
-    """Sentences about order of contact, events and what to be careful with."""
+    """Sentences about order of contact, errors of events, and flags."""
     said: list[str] = []
     against = result["against_truth"]
     errors = {} if against is None else against["rmse_total_n"] or {}
@@ -116,7 +116,7 @@ def notes(result: Mapping[str, Any]) -> list[str]:
 
 
 def total_chart(found: GaitResult, time_s: Array, totals: Mapping[str, Array]) -> Chart:
-    """Both feet's force against time, and the estimates less the truth where it is known."""
+    """The force of both feet over time and, if the truth is known, the errors of the estimates."""
     styles: dict[str, Style] = {"truth": "line", "raw": "dashed", "corrected": "line"}
     lines = [Line(name, totals[name], name, styles[name]) for name in COLUMNS if name in totals]
     panels = [Panel("total force (N)", lines)]
@@ -133,7 +133,7 @@ def total_chart(found: GaitResult, time_s: Array, totals: Mapping[str, Array]) -
 
 
 def print_trial(result: Mapping[str, Any]) -> None:
-    """The trial's numbers and sentences on a terminal."""
+    """Print the trial's figures and sentences on a terminal."""
     console = new_console()
     made = rows(result)
     if made:

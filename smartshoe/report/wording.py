@@ -1,10 +1,10 @@
-"""Sentences as a person reads them."""
+"""Turns texts into sentences and identifiers into words for a person."""
 
 from __future__ import annotations
 
 
 def sentence(text: str) -> str:
-    """``text`` with a full stop, and with a capital unless it begins with a name of a file or a recording."""
+    """``text`` with a full stop and a capital letter, unless it begins with a name of a file or a recording."""
     text = text.strip()
     if not text:
         return ""

@@ -1,1 +1,1 @@
-"""What a person starts: a scenario, a session, a sweep, a study."""
+"""What a person starts: a scenario, a calibration session, a sweep or a study."""

@@ -1,4 +1,4 @@
-"""Checks in the field: zero before use, auto-zero in swing, body weight, units that do not answer, temperature."""
+"""Field checks: zero before use, zero drift in swing, body weight, units that do not answer, temperature."""
 
 from smartshoe.gait.field._at_rest import ZeroReading, check_zero, zero
 from smartshoe.gait.field._body_weight import check_body_weight

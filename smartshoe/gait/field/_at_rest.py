@@ -1,4 +1,4 @@
-"""The zero before use: whether the shoe is unloaded and still, and what each unit reads then."""
+"""The zero before use: checks that the shoe is unloaded and still, and what each unit then reads."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from smartshoe.signals.noise import white_noise_sd
 SHORTEST_S = 1.0
 FEWEST = 20
 BLOCK_S = 0.25
-STILL = 0.002  # of full scale, 1.6 N of 800: a person who stands sways by more
-SETTLED = 0.005  # of full scale over the segment: what a silicone tube that was just let go still loses
+STILL = 0.002  # of full scale, 1.6 N of 800 N: a standing person sways by more
+SETTLED = 0.005  # of full scale over the segment: drift of a silicone tube whose load was just removed
 EVEN = 0.03  # of full scale: how far a unit may lie from what all units share; weight is never that even
 COMMON = 0.2  # of the largest full scale: 8 K are 13.5 % of a 200 mbar range, 16 % of what 800 N read in it
-REPORTED = 0.05  # of full scale: from there on a common shift is worth a word
+REPORTED = 0.05  # of full scale: a larger shift common to all units is reported
 
 
 @dataclass(frozen=True, slots=True)
 class ZeroReading:
-    """A unit's reading at no load: ``reading`` with ``sd`` (of the mean), ``noise`` a sample, ``drift_per_s``.
+    """A unit's reading at no load, with the sd of this mean, the ``noise`` of one sample and the drift per second.
 
-    ``verdict`` "ok" or "warning": it can be used; "fault": the shoe is loaded, moves or settles, as ``says`` tells.
+    With ``verdict`` "ok" or "warning" the reading can be used; with "fault" the shoe is loaded, moves or has not
+    settled, and ``says`` tells which.
     """
 
     unit: str
@@ -45,7 +46,7 @@ class ZeroReading:
         return self.verdict in ("ok", "warning")
 
     def finding(self) -> CheckResult:
-        """The same as a finding."""
+        """The reading as a `CheckResult`."""
         numbers = {"reading": self.reading, "sd": self.sd, "noise": self.noise, "drift_per_s": self.drift_per_s}
         return CheckResult("zero", self.verdict, self.says, self.unit, self.span_s, numbers)
 
@@ -59,12 +60,12 @@ def check_zero(
     expected: ArrayLike = 0.0,
     symbol: str = "",
 ) -> tuple[ZeroReading, ...]:
-    """What each unit reads while nobody stands in the shoe, and whether that is so.
+    """What each unit reads while nobody stands in the shoe, with a verdict on whether the shoe was unloaded.
 
-    ``time_s`` (n,), ``readings`` (n, units) of a second at least; ``full_scale`` and ``expected`` (the calibration's
-    offset), a number or (units,), in the readings' unit. A unit is taken as loaded where it lies further from
-    ``expected`` than the others do (weight is never even, warm air is), or all lie further than warm air explains.
-    Raises `UsageError` where the shapes do not fit.
+    ``time_s`` (n,) and ``readings`` (n, units) span at least a second. ``full_scale`` and ``expected`` (the
+    calibration's offset) are a number or (units,), in the unit of the readings. A unit counts as loaded if it lies
+    further from ``expected`` than the others do, since weight, unlike warm air, is never even; or if all lie further
+    from it than warm air explains. Raises `UsageError` if the shapes do not fit.
     """
     time, values = np.asarray(time_s, dtype=float), np.asarray(readings, dtype=float)
     if values.ndim == 1:
@@ -102,7 +103,7 @@ def zero(
     expected: ArrayLike = 0.0,
     symbol: str = "",
 ) -> Array:
-    """The units' zeros (units,), as `check_zero` has them; raises `RefusedError` where one is not to be used."""
+    """The zeros (units,) that `check_zero` finds; raises `RefusedError` if one of them cannot be used."""
     found = check_zero(time_s, readings, names, full_scale=full_scale, expected=expected, symbol=symbol)
     for item in found:
         if not item.is_usable:
@@ -113,6 +114,7 @@ def zero(
 def _zero_of(
     name: str, time: Array, values: Array, scale: float, shift: float, shared: float, common: float, symbol: str
 ) -> ZeroReading:
+    """The zero of one unit: its mean after removing a linear drift, judged by shift, sway and drift."""
     span = (float(time[0]), float(time[-1]))
     there = np.isfinite(values)
     at, y = time[there], values[there]

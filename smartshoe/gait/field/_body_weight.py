@@ -1,7 +1,7 @@
-"""Body weight as a check of everything: over whole strides the mean total force is the body's weight.
+"""Checks the whole system by body weight: the mean total force over whole strides must equal it.
 
-Momentum is the same at both ends of a stride, so the ground's mean vertical force balances gravity (of the part that
-passes through the units: ``coverage``).
+Momentum is the same at both ends of a stride, so the mean vertical ground force balances gravity. Only the share
+``coverage`` of it passes through the units.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from smartshoe.signals.masks import runs_of
 TOLERANCE = 0.05
 FEWEST_STRIDES = 3
 SHORTEST_STRIDE_S, LONGEST_STRIDE_S = 0.4, 2.5
-LEAST_RISE = 0.2  # of body weight: less is sway
-STANDING_BLOCK_S = 5.0  # sway has periods of seconds: its means over 5 s are nearly independent
+LEAST_RISE = 0.2  # of body weight: a smaller variation is sway
+STANDING_BLOCK_S = 5.0  # sway has periods of seconds, so means over 5 s are nearly independent
 FEWEST_BLOCKS = 3
 
 
 def heel_strikes(foot_n: Array, sample_rate_hz: float, least_rise: float) -> list[int]:
-    """Ends of the swings of one foot (samples), to within the rise of a heel's load."""
+    """The ends of one foot's swings, as indices of samples, to within the rise time of the heel's load."""
     window = round(WINDOW_S * sample_rate_hz)
-    hop = max(1, window // 2)  # no swing is longer than half of a window, so each lies whole in one
+    hop = max(1, window // 2)  # no swing is longer than half a window, so each lies completely in one of them
     found: list[int] = []
     for first in range(0, max(foot_n.size - window, 0) + hop, hop):
         for swing in swings(foot_n[first : first + window], sample_rate_hz, least_rise):
             at = first + swing.stop
-            # The same swing in the next window ends within a few samples of here: its valley is another one's.
+            # Windows overlap: a swing found again ends within a few samples of the first time.
             if not found or at - found[-1] > 0.5 * SHORTEST_STRIDE_S * sample_rate_hz:
                 found.append(at)
     return found
@@ -49,12 +49,12 @@ def check_body_weight(
     coverage: float = 1.0,
     tolerance: float = TOLERANCE,
 ) -> CheckResult:
-    """Whether the mean total force over whole strides (or of standing) is ``coverage`` times ``body_weight_n``.
+    """Check that the mean total force over whole strides (or standing) is ``coverage`` times ``body_weight_n``.
 
-    ``time_s`` (n,) on an even time base, ``feet_n`` by foot (n,), each foot's units summed. "ok" where the 95 %
-    interval lies within ``tolerance`` of what is expected, "fault" where it lies outside, "warning" between;
-    "unknown" where there are neither strides nor standing, or one foot only. ``numbers``: mean_n, low_n, high_n,
-    expected_n, ratio, strides.
+    ``time_s`` (n,) is evenly spaced; ``feet_n`` holds for each foot the sum over its units (n,) in N. The verdict is
+    "ok" if the 95 % interval lies within ``tolerance`` of the expected force, "fault" if it lies outside, "warning" if
+    it overlaps the limit, and "unknown" if there are neither strides nor standing, or only one foot. ``numbers``:
+    mean_n, low_n, high_n, expected_n, ratio, strides.
     """
     if not (math.isfinite(body_weight_n) and body_weight_n > 0.0):
         raise UsageError(f"body weight is {body_weight_n:g} N: give a number above 0, for example 700")
@@ -103,7 +103,7 @@ def check_body_weight(
 def _whole_strides(
     feet: Mapping[str, Array], total: Array, rate_hz: float, body_weight_n: float
 ) -> tuple[slice, Array | None, str]:
-    """The longest chain of strides of the foot that has most: its span, the mean total (strides,) of each."""
+    """The longest chain of strides of one foot: its span, the mean total (strides,) of each, and a text for it."""
     best: list[int] = []
     for foot in feet.values():
         chain: list[int] = []
@@ -120,14 +120,14 @@ def _whole_strides(
 
 
 def _standing(total: Array, rate_hz: float, body_weight_n: float) -> tuple[Array | None, slice, str]:
-    """The segment in which somebody stands still on the units, in blocks: their means, the span, its length."""
+    """The longest spell of standing still, in blocks: the blocks' mean forces, its span, and a text for it."""
     from scipy.ndimage import uniform_filter1d
 
     second = max(1, round(rate_hz))
     level = uniform_filter1d(total, second)
     spread = np.sqrt(np.maximum(uniform_filter1d((total - level) ** 2, second), 0.0))
     still = (spread < LEAST_RISE / 4 * body_weight_n) & (level > LEAST_RISE * body_weight_n)
-    # A second at either end still feels the step on and off.
+    # For a second at either end the force still shows the step on or off.
     runs = [(int(a) + second, int(b) - second) for a, b in zip(*runs_of(still), strict=True)]
     first, stop = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
     count = int((stop - first) / rate_hz / STANDING_BLOCK_S)

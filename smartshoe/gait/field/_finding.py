@@ -1,4 +1,4 @@
-"""`CheckResult`: what a check in the field has to say of a shoe or a unit, typed, with one sentence."""
+"""`CheckResult`: the result of one check in the field, about a shoe or a unit."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ Verdict = Literal["ok", "warning", "fault", "unknown"]
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """``kind`` of check, its ``verdict``, the ``unit`` (or foot; '' for all), ``span_s`` of time, ``numbers`` by name.
+    """The result of one check: its ``kind``, its ``verdict``, and one sentence, ``says``.
 
-    "unknown" is a check that the data cannot carry out; ``says`` tells why.
+    ``unit`` is the unit or foot concerned ('' for all), ``span_s`` the time looked at, ``numbers`` further results by
+    name. The verdict "unknown" means that the data do not allow the check.
     """
 
     kind: str
@@ -25,7 +26,7 @@ class CheckResult:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """The finding for JSON."""
+        """The result as an object for JSON; numbers that are not finite become None."""
         return {
             "kind": self.kind,
             "verdict": self.verdict,

@@ -1,4 +1,4 @@
-"""Units that do not answer: stuck at a value, on a rail, silent, or dead while their neighbours move."""
+"""Finds units that do not respond: stuck, on a rail, without samples, or dead while their neighbours move."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from smartshoe.gait.field._finding import CheckResult
 from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import white_noise_sd
 
-UP, DOWN = 0.6, 0.4  # of a unit's own rise: a press goes above the one after it was below the other
-MOVES = 10.0  # noises: a unit with a smaller rise is not pressed
-CYCLES = 3  # presses of the neighbours that a unit may sit out: a toe does not bear load in every shuffle
-DEAD = 0.03  # of what the neighbours rise by, each on its own scale
-GAP_S = 0.5  # what is shorter is a burst of the radio; three presses take longer as well
-RAIL_RUN = 3  # samples in a row on the largest value
+UP, DOWN = 0.6, 0.4  # of a unit's own rise: a press begins when the reading goes above UP after having been below DOWN
+MOVES = 10.0  # times the noise: a unit with a smaller rise is not pressed
+CYCLES = 3  # presses of the neighbours that a unit may miss; a toe does not bear load in every shuffling step
+DEAD = 0.03  # of the neighbours' rise, each relative to its own full scale
+GAP_S = 0.5  # shorter gaps are losses of the radio; three presses take longer as well
+RAIL_RUN = 3  # samples in a row at the largest value
 RAIL_SHARE = 0.001
 
 
@@ -30,12 +30,12 @@ def check_units(
     full_scale: ArrayLike,
     range_high: ArrayLike | None = None,
 ) -> tuple[CheckResult, ...]:
-    """Faults of units in ``readings`` (n, units), NaN where a sample is missing; () where all answer.
+    """Faults of units in ``readings`` (n, units), NaN where a sample is missing; an empty tuple if all units respond.
 
-    Kinds: ``no_samples`` (a gap of half a second and more), ``stuck`` (one value while the neighbours are pressed
-    three times), ``dead`` (noise, but no answer to that), ``saturated`` (at ``range_high``, or repeating its largest
-    value). ``full_scale`` (a number or (units,)) makes units of different ranges comparable. Where no neighbour moves,
-    nothing can be said of ``stuck`` and ``dead``.
+    Kinds: ``no_samples`` (a gap of half a second or more), ``stuck`` (one constant value while the neighbours are
+    pressed three times), ``dead`` (noise, but no response to the same), ``saturated`` (at ``range_high``, or repeatedly
+    at its largest value). ``full_scale`` (a number or (units,)) makes units of different ranges comparable. ``stuck``
+    and ``dead`` can only be found if a neighbour moves.
     """
     time, values = np.asarray(time_s, dtype=float), np.asarray(readings, dtype=float)
     if values.ndim != 2 or values.shape != (time.size, len(names)):
@@ -59,6 +59,7 @@ def check_units(
 
 
 def _held(values: Array, there: Mask) -> Array:
+    """The values with missing samples replaced by the last present one, or the first at the start."""
     index = np.maximum.accumulate(np.where(there, np.arange(values.shape[0])[:, None], -1), axis=0)
     first = np.argmax(there, axis=0)
     held = np.take_along_axis(values, np.where(index < 0, first[None, :], index), axis=0)
@@ -66,12 +67,13 @@ def _held(values: Array, there: Mask) -> Array:
 
 
 def _rise(values: Array) -> float:
+    """The range of a unit's readings, from the 2nd to the 98th percentile."""
     low, high = np.quantile(values, (0.02, 0.98))
     return float(high - low)
 
 
 def _presses(values: Array, rise: float) -> Index:
-    """Samples at which the unit is pressed anew."""
+    """The samples at which a new press of the unit begins."""
     low = float(np.quantile(values, 0.02))
     index = np.arange(values.size)
     up = np.maximum.accumulate(np.where(values > low + UP * rise, index, -1))
@@ -80,12 +82,13 @@ def _presses(values: Array, rise: float) -> Index:
 
 
 def _runs(at: Mask) -> list[tuple[int, int]]:
-    """First and last sample of each run of True."""
+    """First and last index of each run of True."""
     first, after = runs_of(at)
     return list(zip(first.tolist(), (after - 1).tolist(), strict=True))
 
 
 def _gaps(time: Array, there: Mask, name: str) -> list[CheckResult]:
+    """A finding if samples are missing for `GAP_S` or longer."""
     long = [(a, b) for a, b in _runs(~there) if time[min(b + 1, time.size - 1)] - time[a] >= GAP_S]
     if not long:
         return []
@@ -102,6 +105,8 @@ def _stuck_or_dead(
     time: Array, values: Array, name: str, rises: Array, scale: Array, k: int, others: list[int],
     presses: list[Index],
 ) -> list[CheckResult]:  # fmt: skip
+    """A finding if unit ``k`` is constant, or hardly responds, while ``others`` are pressed repeatedly."""
+
     def sat_out(first: int, last: int) -> int:
         return int(np.median([np.count_nonzero((presses[j] > first) & (presses[j] <= last)) for j in others]))
 
@@ -129,12 +134,13 @@ def _stuck_or_dead(
 
 
 def _saturated(time: Array, values: Array, name: str, high: float | None, rise: float) -> list[CheckResult]:
+    """A finding if the readings reach their largest value again and again, or for long."""
     top = float(values.max())
     if rise <= 0.0 or (high is not None and top < 0.995 * high):
         return []
     runs = [(a, b) for a, b in _runs(values == top) if b - a + 1 >= RAIL_RUN]
     share = sum(b - a + 1 for a, b in runs) / values.size
-    # One flat top may be chance or quantisation; a rail is met again and again, or for long.
+    # One flat top may be chance or quantisation; a rail is reached repeatedly, or for long.
     if share < RAIL_SHARE or (high is None and len(runs) < CYCLES):
         return []
     says = (

@@ -1,4 +1,4 @@
-"""`SwingZero`: while a foot is surely in swing its units bear nothing, so what they show then is their zero."""
+"""`SwingZero`: corrects the zero of a foot's units in swing, when they bear no load."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.gait.field._swings import swings
 
-WINDOW_S, HOP_S = 4.0, 0.5  # two strides of a slow walk; how often it is looked at
-AGREEING, WITHIN_S = 3, 10.0  # so many swings, within so long, must agree before anything moves
-AGREE = 0.03  # of the rise: how far the swings' levels may lie apart
+WINDOW_S, HOP_S = 4.0, 0.5  # window, two strides of a slow walk, and the interval at which it is searched
+AGREEING, WITHIN_S = 3, 10.0  # number of swings, and the time within which they must agree before the zero moves
+AGREE = 0.03  # of the rise: how far the levels of these swings may differ
 SLEW_PER_S = 0.001  # of full scale: 8 K in ten minutes move sealed air by a quarter of that
 MOST = 0.35  # of full scale: 8 K are 16 % of what 800 N read in a 200 mbar range, 32 % in the toe's 100 mbar
 LEAST_RISE = 0.15  # of full scale, all units together: no sway of a standing person makes that
 
 
 class SwingZero:
-    """Forces of one foot's units in, the same less their zero out, on a stream; the zero is renewed in swing only.
+    """Takes forces of one foot's units as a stream and returns them less their zero, which is updated only in swing.
 
-    The zero moves when three swings within ten seconds, each a flat valley of 0.15 to 1 s between two stances, agree;
-    then by at most ``slew_per_s`` of full scale, and never further than ``most`` of it. A load that stays (standing,
-    a bag in the shoe, a foot that rests for more than a second) has no such valleys, so it is never taken for a zero.
-    A load that is the same in every swing (tight lacing) is.
+    The zero moves when three swings within ten seconds agree, each a flat valley of 0.15 to 1 s between two stances. It
+    moves by at most ``slew_per_s`` of full scale and stays within ``most`` of it. A lasting load (standing, a bag in
+    the shoe, a foot that rests for more than a second) has no such valleys and is never taken for a zero. A load that
+    is the same in every swing (tight lacing) is.
 
-    Feed it compensated forces: in raw readings the silicone's relaxation is still there in swing.
+    Feed it compensated forces: raw readings still contain the silicone's relaxation in swing.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class SwingZero:
         self.reset()
 
     def reset(self) -> None:
-        """Back to a zero of 0, nothing seen."""
+        """Start anew with a zero of 0."""
         self.zero: Array = np.zeros(self._units)
         self.swings = 0
         self._recent = np.empty((0, self._units))
@@ -61,9 +61,9 @@ class SwingZero:
         self._levels: list[tuple[int, Array, float]] = []
 
     def push(self, forces: ArrayLike) -> Array:
-        """Forces (n, units) less the zero as it was known at each sample; any chunking gives the same.
+        """Forces (n, units) less the zero known at each sample; how the stream is divided makes no difference.
 
-        A value that is not finite holds the last one. Raises `UsageError` for another number of units.
+        A value that is not finite is replaced by the last one. Raises `UsageError` for another number of units.
         """
         block = np.atleast_2d(np.asarray(forces, dtype=float))
         if block.ndim != 2 or block.shape[1] != self._units:
@@ -79,10 +79,11 @@ class SwingZero:
             self._count += take
             at += take
             if self._count % self._hop == 0:
-                self._look()
+                self._find_swings()
         return out
 
     def _held(self, block: Array) -> Array:
+        """The block with values that are not finite replaced by the last finite one."""
         finite = np.isfinite(block)
         if not finite.all():
             whole = np.vstack([self._last, block])
@@ -93,7 +94,8 @@ class SwingZero:
             self._last = block[-1].copy()
         return block
 
-    def _look(self) -> None:
+    def _find_swings(self) -> None:
+        """Find new swings in the recent forces and use their levels."""
         first = self._count - self._recent.shape[0]
         total = self._recent.sum(axis=1)
         for swing in swings(total, self.sample_rate_hz, LEAST_RISE * self.full_scale):
@@ -102,9 +104,10 @@ class SwingZero:
             self._used = first + swing.stop
             rise = float(np.quantile(total, 0.98) - np.quantile(total, 0.02))
             self._levels.append((self._used, self._recent[swing.middle].mean(axis=0), rise))
-            self._renew()
+            self._update_zero()
 
-    def _renew(self) -> None:
+    def _update_zero(self) -> None:
+        """Move the zero towards the level of the last swings if they agree."""
         oldest = self._used - round(WITHIN_S * self.sample_rate_hz)
         self._levels = [level for level in self._levels if level[0] >= oldest][-AGREEING:]
         if len(self._levels) < AGREEING:
@@ -114,7 +117,7 @@ class SwingZero:
         if float(np.ptp(seen, axis=0).max()) > AGREE * rise:
             return
         self.swings += 1
-        # A pause counts as ten seconds at most: what moved meanwhile is followed from here on.
+        # A pause counts as ten seconds at most: a drift during it is corrected gradually from here on.
         passed = min(self._used - self._moved_at, self._used - oldest)
         most = self.slew * passed / self.sample_rate_hz
         step = np.clip(np.median(seen, axis=0) - self.zero, -most, most)

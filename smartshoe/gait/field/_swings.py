@@ -1,6 +1,6 @@
-"""Swings of a foot, from the sum of its units, wherever the zero has gone: flat valleys between stances.
+"""Finds a foot's swings in the sum of its units, whatever its zero: flat valleys between stances.
 
-Coarse on purpose: what is needed is a time in which the foot is surely off the ground, not the moment of toe off.
+Approximate on purpose: a time is needed in which the foot is surely off the ground, not the moment of toe off.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 
-SHORTEST_S, LONGEST_S = 0.15, 1.0  # a sprinter's swing is longer, a valley of 1 s and more is a foot that rests
-ENTER, LEAVE = 0.10, 0.25  # of the rise above the valley
-FLAT = 0.03  # of the rise: how far a swing's middle may spread or slope; a foot that still bears load does not keep so
-FROM, TO = 0.4, 0.8  # of a swing: the shoe has let go and the heel is not yet down
+SHORTEST_S, LONGEST_S = 0.15, 1.0  # even a sprinter swings longer than the first; beyond the second a foot rests
+ENTER, LEAVE = 0.10, 0.25  # of the rise above the valley: thresholds below which a swing begins, above which it ends
+FLAT = 0.03  # of the rise: how far a swing's middle may spread or slope; a loaded foot does not stay so constant
+FROM, TO = 0.4, 0.8  # of a swing: by then the shoe is unloaded, and the heel is not yet down
 
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """Samples ``start`` up to ``stop`` below the threshold, ``middle`` of them surely off the ground."""
+    """A swing: samples ``start`` up to ``stop`` are below the threshold; in ``middle`` the foot is in the air."""
 
     start: int
     stop: int
@@ -27,7 +27,7 @@ class Swing:
 
 
 def is_low(total: Array, low: float, rise: float) -> Mask:
-    """(n,) below the valley's threshold, with hysteresis between ``ENTER`` and ``LEAVE`` of ``rise``."""
+    """(n,) True below the valley's threshold, with hysteresis between ``ENTER`` and ``LEAVE`` of ``rise``."""
     below, above = total < low + ENTER * rise, total > low + LEAVE * rise
     index = np.arange(total.size)
     last_below = np.maximum.accumulate(np.where(below, index, -1))
@@ -38,8 +38,8 @@ def is_low(total: Array, low: float, rise: float) -> Mask:
 def swings(total: Array, sample_rate_hz: float, least_rise: float) -> list[Swing]:
     """Swings that begin and end within ``total`` (n,): some seconds of a foot's summed load, in any unit.
 
-    The valley is the lowest level there is, so an offset changes nothing. ``least_rise``, in the same unit: what rises
-    less than this above the valley is no step.
+    The valley is the lowest level in ``total``, so an offset changes nothing. A rise above it of less than
+    ``least_rise``, in the same unit, is not a step.
     """
     low, high = (float(x) for x in np.quantile(total, (0.02, 0.98)))
     rise = high - low
@@ -59,6 +59,7 @@ def swings(total: Array, sample_rate_hz: float, least_rise: float) -> list[Swing
 
 
 def _is_flat(part: Array, rise: float) -> bool:
+    """Whether the middle of a swing neither spreads nor slopes by more than `FLAT` of the rise."""
     third = max(part.size // 3, 1)
     slope = float(part[-third:].mean() - part[:third].mean())
     return bool(part.std() <= FLAT * rise and abs(slope) <= FLAT * rise)

@@ -1,4 +1,7 @@
-"""Temperature: sealed air that warms presses like a foot. p V = n R T at constant n and V: dp/dT = p/T."""
+"""Temperature: sealed air that warms raises the pressure as a load does.
+
+From p V = n R T at constant n and V, dp/dT = p/T.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +18,11 @@ ATMOSPHERE_PA = 101_325.0
 ROOM_K = 295.0
 AGREE_CHANCE = 0.01
 LARGE_K = 3.0  # about 10 mbar, 5 % of a 200 mbar range
-FIXED_SHARE = 0.10  # how alike sealed units are: the walls give, the lines differ
+FIXED_SHARE = 0.10  # of the change: how far sealed units differ, since walls give way and lines differ
 
 
 def sealed_air_pa_per_k(absolute_pressure_pa: float = ATMOSPHERE_PA, temperature_k: float = ROOM_K) -> float:
-    """Rise of pressure in Pa per K of air sealed in a volume that keeps: p/T."""
+    """Rise of pressure in Pa per K of air sealed in a constant volume: p/T."""
     if not (absolute_pressure_pa > 0.0 and temperature_k > 0.0):
         raise UsageError(f"{absolute_pressure_pa:g} Pa at {temperature_k:g} K is no state of air: give both above 0")
     return absolute_pressure_pa / temperature_k
@@ -34,11 +37,12 @@ def temperature_of_zeros(
     temperature_k: float = ROOM_K,
     when: str = "",
 ) -> CheckResult:
-    """The warming that ``changes_pa`` (units,) of the zeros, with ``sd_pa``, mean if all of it is sealed air.
+    """The warming that would cause the changes ``changes_pa`` (units,) of the zeros, with sd ``sd_pa``, in sealed air.
 
-    Warm air raises every sealed unit alike; units that disagree beyond their sd (and a tenth of the change, for walls
-    and lines) have a cause of their own: a leak, a load, a sensor. Then the verdict is "unknown" and the one furthest
-    off is named. ``when`` ("at the start: ") begins the sentence. ``numbers``: delta_k, sd_k, change_pa, p_value.
+    Warm air raises all sealed units alike. Units that differ by more than their sd (and a tenth of the change, for
+    walls and lines) have a cause of their own: a leak, a load, a sensor. The verdict is then "unknown" and the unit
+    furthest off is named. ``when`` ("at the start: ") begins the sentence. ``numbers``: delta_k, sd_k, change_pa,
+    p_value.
     """
     changes = np.atleast_1d(np.asarray(changes_pa, dtype=float))
     sds = np.broadcast_to(np.asarray(sd_pa, dtype=float), changes.shape)
@@ -81,10 +85,11 @@ def temperature_sensitivity(
     *,
     absolute_pressure_pa: float = ATMOSPHERE_PA,
 ) -> CheckResult:
-    """How a unit's ``zeros_pa`` (n,) follow a measured ``temperature_k`` (n,), against the p/T of sealed air.
+    """How a unit's ``zeros_pa`` (n,) follow a measured ``temperature_k`` (n,), compared with p/T of sealed air.
 
-    ``numbers``: pa_per_k with low and high (95 %), sealed_pa_per_k, share of it. A share near 1 is a sealed rigid
-    tube, well below 1 one that gives or leaks. "unknown" where the temperature hardly moved.
+    ``numbers``: pa_per_k with low and high (95 %), sealed_pa_per_k, and the ratio as share. A share near 1 means a
+    sealed rigid tube; well below 1, one that gives way or leaks. The verdict is "unknown" if the temperature hardly
+    changed.
     """
     warm, zeros = np.asarray(temperature_k, dtype=float), np.asarray(zeros_pa, dtype=float)
     if warm.shape != zeros.shape or warm.ndim != 1 or warm.size < 3:

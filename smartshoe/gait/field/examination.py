@@ -1,4 +1,4 @@
-"""Every check that a recording of a shoe allows, in the order in which a person would make them."""
+"""`examine`: all checks that a recording of a shoe allows, in the order in which a person would make them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from smartshoe.gait.field._temperature import temperature_of_zeros
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
 from smartshoe.signals.noise import white_noise_sd
 
-USUAL_FULL_SCALE_N = 800.0  # of the paper's protocols
+USUAL_FULL_SCALE_N = 800.0  # of the protocols in the paper
 REST_LONGEST_S = 5.0
-STEPS_ON = 0.05  # of full scale: what a unit moves by when the shoe is stepped into
-BEFORE_S = 0.3  # of the rest is left out before that: a hand on the shoe
-LOADED_NOISES = 50.0  # of a reading's noise: a step moves it by more, a rest never
+STEPS_ON = 0.05  # of full scale: a unit's change when somebody steps into the shoe
+BEFORE_S = 0.3  # end of the rest that is left out, since a hand may be on the shoe
+LOADED_NOISES = 50.0  # times the noise of a reading: a step changes it by more, a rest never does
 REPORTED_DRIFT = 0.02  # of full scale
 ZERO_REPEATS = 0.002  # of full scale: how well a sensor's zero repeats from day to day (HDI data sheet: 0.1 % typical)
 WORST: tuple[Verdict, ...] = ("fault", "warning", "unknown", "ok")
@@ -44,7 +44,7 @@ class Examination:
 
     @property
     def verdict(self) -> Verdict:
-        """One of "fault", "warning" and "ok"."""
+        """The most serious verdict: "fault", "warning" or "ok"; "unknown" if nothing could be checked."""
         said = {finding.verdict for finding in self.findings}
         return next((verdict for verdict in ("fault", "warning", "ok") if verdict in said), "unknown")
 
@@ -53,7 +53,7 @@ class Examination:
         return tuple(finding for finding in self.findings if finding.kind == kind)
 
     def to_dict(self) -> dict[str, Any]:
-        """The result for JSON."""
+        """The examination as an object for JSON."""
         return {
             "recording": self.name,
             "verdict": self.verdict,
@@ -68,11 +68,10 @@ def examine(
     body_weight_n: float | None = None,
     coverage: float = 1.0,
 ) -> Examination:
-    """Check the units of a shoe (or two) in ``recording``: answers, zero at the start, drift in swing, body weight.
+    """Check the units of one or two shoes in ``recording``: response, zero at the start, drift in swing, body weight.
 
-    Channels are readings, with a calibration a unit (by its ``unit``'s name) where there is one, or forces already.
-    Raises `MissingChannelError` where the recording has no unit of a shoe, `UsageError` where two calibrations are of
-    one unit.
+    Channels are readings, with a calibration for the unit of that name if there is one, or forces already. Raises
+    `MissingChannelError` if the recording has no unit of a shoe, and `UsageError` if two calibrations are for one unit.
     """
     units = _shoe_of(recording)
     if len(recording) < 2:
@@ -106,8 +105,8 @@ def examine_trial(
 ) -> tuple[Examination, ...]:
     """`examine` for several recordings, each with the calibrations of its units.
 
-    Two recordings of one shoe each, at the same time, are weighed together; that result stands last. Raises
-    `UsageError` for a calibration that fits none of them.
+    For two simultaneous recordings of one shoe each, body weight is checked on their sum, and that result comes last.
+    Raises `UsageError` for a calibration that fits none of them.
     """
     fitting: list[list[Calibration]] = [[] for _ in recordings]
     for calibration in calibrations:
@@ -131,7 +130,7 @@ def examine_trial(
 
 
 def _is_pair(recordings: Sequence[Recording]) -> bool:
-    """Whether these are two, of one shoe each, not of the same foot, that share half of their time at least."""
+    """Whether these are two recordings of one shoe each, of different feet, which overlap by half of their time."""
     if len(recordings) != 2:
         return False
     sides = [{_side(name) for name in _shoe_of(recording)} for recording in recordings]
@@ -145,7 +144,7 @@ def _is_pair(recordings: Sequence[Recording]) -> bool:
 def _weighed_together(
     recordings: Sequence[Recording], fitting: Sequence[Sequence[Calibration]], body_weight_n: float, coverage: float
 ) -> Examination:
-    """The body weight of two shoes in two files; a mean over strides does not mind a delay between their clocks."""
+    """Check body weight on two shoes in two files; a mean over strides tolerates a delay between their clocks."""
     one, other = recordings
     label = f"{one.label} and {other.label}"
     totals: list[tuple[Array, Array]] = []
@@ -164,7 +163,7 @@ def _weighed_together(
 
 
 def _shoe_of(recording: Recording) -> dict[str, Channel]:
-    """The channels of a shoe's units; raises `MissingChannelError` where there is none."""
+    """The channels of a shoe's units; raises `MissingChannelError` if there is none."""
     units = {name: channel for name, channel in recording.channels.items() if name in UNITS_OF_A_SHOE}
     if not units:
         raise MissingChannelError(
@@ -175,7 +174,7 @@ def _shoe_of(recording: Recording) -> dict[str, Channel]:
 
 
 def _named(units: Mapping[str, Channel], calibrations: Sequence[Calibration]) -> dict[str, Calibration]:
-    """The calibration of each unit that has one: by its full name, or by its region where one side is not said."""
+    """The calibration of each unit that has one: by full name, or by region if the calibration names no side."""
     by_name: dict[str, Calibration] = {}
     for calibration in calibrations:
         if calibration.unit in by_name:
@@ -186,7 +185,7 @@ def _named(units: Mapping[str, Channel], calibrations: Sequence[Calibration]) ->
 
 
 def _same_kind(units: Mapping[str, Channel]) -> list[dict[str, Channel]]:
-    """Units of one shoe whose readings are in one unit of measurement: what may be compared."""
+    """Units of one shoe whose readings have the same unit of measurement, so that they can be compared."""
     groups: dict[tuple[str, str], dict[str, Channel]] = {}
     for name, channel in units.items():
         groups.setdefault((_side(name), channel.unit.symbol), {})[name] = channel
@@ -198,7 +197,7 @@ def _side(name: str) -> str:
 
 
 def _full_scale(name: str, channel: Channel, by_unit: Mapping[str, Calibration]) -> float:
-    """Of a reading: what it is known to be, or what is seen."""
+    """Full scale of a unit's readings: the known one, otherwise the range of the recorded readings."""
     known = _known_full_scale(name, channel, by_unit)
     if known is not None:
         return known
@@ -207,7 +206,7 @@ def _full_scale(name: str, channel: Channel, by_unit: Mapping[str, Calibration])
 
 
 def _known_full_scale(name: str, channel: Channel, by_unit: Mapping[str, Calibration]) -> float | None:
-    """Its sensor's range, or what the calibration's largest load reads; None where there is neither."""
+    """The range of the unit's sensor, or the reading at the calibration's largest load; None if neither is known."""
     if channel.unit.quantity == "force":
         return float(channel.unit.from_si(USUAL_FULL_SCALE_N))
     if channel.range_ is not None:
@@ -232,8 +231,8 @@ def _at_rest(
     expected: Array,
     by_unit: Mapping[str, Calibration],
 ) -> list[CheckResult]:
-    """The zero of the time before somebody steps in, where there is one."""
-    held = np.column_stack([channel.values for channel in group.values()])  # missing samples repeat the last one
+    """Check the zero during the time before somebody steps in, and the warming it implies."""
+    held = np.column_stack([channel.values for channel in group.values()])  # missing samples hold the last reading
     first = np.median(held[: max(2, int(0.2 / np.median(np.diff(time_s))))], axis=0)
     noise = np.array([white_noise_sd(column) for column in held.T])
     moved = np.abs(held - first) > np.maximum(STEPS_ON * scale, 6.0 * noise)
@@ -269,7 +268,7 @@ def _at_rest(
 
 
 def _forces(recording: Recording, units: Mapping[str, Channel], by_unit: Mapping[str, Calibration]) -> dict[str, Array]:
-    """Force (n,) in N of each unit that has one."""
+    """Force (n,) in N of each unit whose force is known."""
     forces: dict[str, Array] = {}
     for name, channel in units.items():
         if channel.unit.quantity == "force":
@@ -290,7 +289,7 @@ def _feet(forces: Mapping[str, Array]) -> dict[str, list[str]]:
 def _in_swing(
     recording: Recording, forces: Mapping[str, Array], by_unit: Mapping[str, Calibration]
 ) -> list[CheckResult]:
-    """How far each unit's zero lies off in swing at the end, and what warming that would be."""
+    """Each unit's zero error in swing at the end of the recording, and the warming it would imply."""
     names = list(forces)
     follower = SwingZero(len(names), sample_rate_hz=recording.sample_rate_hz, slew_per_s=1.0)
     follower.push(np.column_stack(list(forces.values())))
@@ -306,7 +305,7 @@ def _in_swing(
         )  # fmt: skip
     warm = [name for name in names if name in by_unit and by_unit[name].reading_unit.quantity == "pressure"]
     if len(warm) == len(names) and len(warm) > 1:
-        # Back from force to pressure by the static gain: a zero moves slowly.
+        # Convert from force back to pressure by the static gain; the zero moves slowly enough for that.
         per_n = np.array([by_unit[n].a1 / by_unit[n].b1 * by_unit[n].reading_unit.scale for n in warm])
         spread_n = np.array([max(white_noise_sd(forces[name]), 1.0) for name in warm])
         found.append(temperature_of_zeros(follower.zero * per_n, spread_n * per_n, warm, when="in swing at the end: "))
@@ -321,6 +320,7 @@ def _body_weight(
     body_weight_n: float,
     coverage: float,
 ) -> CheckResult:
+    """Check body weight on the forces of the feet; "unknown" if they cannot be used."""
     finding = _not_weighable(recording, units, forces)
     if finding is not None:
         return finding
@@ -331,7 +331,7 @@ def _body_weight(
 def _not_weighable(
     recording: Recording, units: Mapping[str, Channel], forces: Mapping[str, Array]
 ) -> CheckResult | None:
-    """Why the forces cannot be weighed, None where they can."""
+    """The reason why body weight cannot be checked; None if it can."""
     without = [name for name in units if name not in forces]
     if without:
         many = "has" if len(without) == 1 else "have"

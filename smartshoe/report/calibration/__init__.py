@@ -1,4 +1,4 @@
-"""A calibration as a page: what to trust, what to look at, and the numbers behind."""
+"""The report on a calibration: a page with a verdict on each unit, and the numbers behind it."""
 
 from smartshoe.report.calibration._judgement import headline, judge
 from smartshoe.report.calibration._page import write_page

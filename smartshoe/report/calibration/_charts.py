@@ -1,4 +1,4 @@
-"""A unit's charts: error by rate, what the loops leave, signals, the filter's response."""
+"""A unit's charts: error by rate, residual loops, signals, and the filter's frequency response."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from smartshoe.report.numbers import plain
 from smartshoe.signals.loading import Cycle, Ramp, by_rate, cycles
 
 LOOP_POINTS = 160
-SHARE = np.linspace(0.02, 0.98, LOOP_POINTS)  # of the load's span: a ramp's own corners are cut off
+SHARE = np.linspace(0.02, 0.98, LOOP_POINTS)  # of the load's span: the corners at the ends of a ramp are left out
 GAIT_HZ = (0.5, 5.0)
 
 
@@ -49,14 +49,14 @@ def _cycles_by_rate(validation: Validation) -> dict[float, list[tuple[ForceTrace
 
 
 def _over_load(load_n: Array, error_n: Array, ramp: Ramp, at_n: Array) -> Array:
-    """The ramp's error on a grid of loads: means of what falls between neighbours, so that noise does not fold."""
+    """The ramp's error at the loads ``at_n``, smoothed between neighbouring loads so that noise is not aliased."""
     span = slice(ramp.start, ramp.stop)
     order = np.argsort(load_n[span], kind="stable")
     return np.asarray(np.interp(at_n, load_n[span][order], _smooth(error_n[span][order])))
 
 
 def _smooth(values: Array) -> Array:
-    """Running mean over a grid step of the drawing."""
+    """Running mean over one step of the chart's grid."""
     width = max(1, values.size // LOOP_POINTS)
     padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
     return np.asarray(np.convolve(padded, np.full(width, 1.0 / width), mode="valid"))
@@ -64,9 +64,9 @@ def _smooth(values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualLoop:
-    """What a unit's estimates miss at ``rate_n_per_s`` over loads ``at_n`` (n,), the mean over the rate's cycles.
+    """A unit's errors at ``rate_n_per_s`` over loads ``at_n`` (n,), averaged over the cycles of that rate.
 
-    ``errors_n`` (n,) are estimate less load, by "raw up", "raw down", "corrected up", "corrected down".
+    ``errors_n`` maps "raw up", "raw down", "corrected up" and "corrected down" to estimate minus load (n,), in N.
     """
 
     rate_n_per_s: float
@@ -75,7 +75,7 @@ class ResidualLoop:
 
 
 def residual_loops(validation: Validation) -> tuple[ResidualLoop, ...]:
-    """The loops at the slowest and at the fastest rate; one where there is one rate, none without cycles."""
+    """The loops at the slowest and at the fastest rate; only one if there is one rate, none without cycles."""
     groups = _cycles_by_rate(validation)
     return tuple(_residual_loop(rate, groups[rate]) for rate in sorted({min(groups), max(groups)} if groups else ()))
 
@@ -96,7 +96,7 @@ def _residual_loop(rate_n_per_s: float, group: Sequence[tuple[ForceTrace, Cycle]
 
 
 def loop_chart(unit: UnitReport, loop: ResidualLoop, limits: tuple[float, float]) -> Chart:
-    """What the static line and the filter miss against load, loading and unloading apart."""
+    """The errors of the static line and of the filter over load, separately for loading and unloading."""
     errors = loop.errors_n
     widths = {kind: float(np.abs(errors[f"{kind} up"] - errors[f"{kind} down"]).max()) for kind in ("raw", "corrected")}
     says = (
@@ -116,7 +116,7 @@ def loop_chart(unit: UnitReport, loop: ResidualLoop, limits: tuple[float, float]
 
 
 def signals(unit: UnitReport, recording: Recording) -> Chart:
-    """Load and reading against time, and what is left where the recording was judged."""
+    """Load and reading over time and, if the recording was judged, the remaining error."""
     sensor = recording.sensor
     panels = [
         Panel("load (N)", [Line("load", recording.force_n, "load")], height=120),
@@ -133,7 +133,7 @@ def signals(unit: UnitReport, recording: Recording) -> Chart:
 
 
 def response(unit: UnitReport) -> Chart:
-    """Gain and phase lead of the filter at its sample rate; gait's band is shaded."""
+    """Gain and phase lead of the filter at its sample rate; the frequency band of gait is shaded."""
     discrete, parameters = unit.identification["discrete"], unit.identification["parameters"]
     rate_hz = float(discrete["sample_rate_hz"])
     a1, b0, b1 = (float(parameters[name]["value"]) for name in ("a1", "b0", "b1"))
@@ -163,7 +163,7 @@ def response(unit: UnitReport) -> Chart:
 def common_limits(
     units: Sequence[UnitReport], loops: Iterable[ResidualLoop]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """One scale for every unit's loops and one for their errors by rate, so that units compare at a glance."""
+    """A common scale for all units' loops and one for their errors by rate, so that units can be compared."""
     widest = max((float(np.abs(error).max()) for loop in loops for error in loop.errors_n.values()), default=1.0)
     worst = max(
         (max(rate.rmse_static_n, rate.rmse_compensated_n) for unit in units for rate in unit.validation.rates),

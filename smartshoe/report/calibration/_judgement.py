@@ -1,4 +1,4 @@
-"""Whether a unit's calibration can be trusted, in one word and one sentence."""
+"""Judges whether a unit's calibration can be trusted, as a grade and a sentence."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from smartshoe.report.numbers import plain
 
 Grade = Literal["good", "look", "bad"]
 
-# Error (rms) in percent of full scale: 0.5 is the class of a good industrial load cell; 2 is what a table of weights
-# gets from these units without any model.
+# Limits of the error (rms) in percent of full scale: 0.5 is the class of a good industrial load cell; 2 is what a table
+# of weights reaches with these units without any model.
 GOOD_PERCENT, BAD_PERCENT = 0.5, 2.0
-LOOP_PERCENT = 1.0  # of full scale, between loading and unloading after correction
-WORTH_PERCENT = 5.0  # less than this below the static line is no gain worth a filter
-FRICTION_SHARE = 0.5  # of the widest loop that is left at the slowest rate: a lag's loop closes there
+LOOP_PERCENT = 1.0  # of full scale, between loading and unloading after correction: widest acceptable loop
+WORTH_PERCENT = 5.0  # a smaller gain over the static line is not worth a filter
+FRICTION_SHARE = 0.5  # of the widest remaining loop: at the slowest rate the loop of a lag is narrower than this
 
 WORST_FIRST: tuple[Grade, ...] = ("bad", "look", "good")
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """A unit's grade, why in a few words, and what to do; ``does`` is empty where nothing needs doing."""
+    """A unit's grade, its reason in a few words, and advice; ``does`` is empty if nothing needs to be done."""
 
     unit: str
     grade: Grade
@@ -38,12 +38,12 @@ class Judgement:
 
 
 def error_percent(validation: Validation) -> float:
-    """What correction leaves (rms), in percent of full scale."""
+    """The rms error after correction, in percent of full scale."""
     return 100.0 * validation.overall.rmse_compensated_n / validation.full_scale_n
 
 
 def looks_like_friction(rates: Sequence[RateResult]) -> bool:
-    """Whether a wide loop is left at every rate, the slowest too."""
+    """Whether a wide loop remains at every rate, including the slowest."""
     widths = [rate.hysteresis_compensated_percent for rate in rates]
     known = [width for width in widths if width is not None]
     if len(known) < 2 or widths[0] is None:
@@ -52,7 +52,7 @@ def looks_like_friction(rates: Sequence[RateResult]) -> bool:
 
 
 def against_static(overall: RateResult) -> str:
-    """How the corrected error compares with the best static line's."""
+    """A text that compares the corrected error with that of the best static line."""
     gain = overall.improvement_over_static_percent
     static, left = plain(overall.rmse_static_n), plain(overall.rmse_compensated_n)
     if gain is None:
@@ -66,7 +66,7 @@ def against_static(overall: RateResult) -> str:
 
 
 def judge(unit: UnitReport) -> Judgement:
-    """The unit's grade: bad is not to be used, look is to be understood first."""
+    """The unit's grade: "bad" is not to be used, "look" needs to be understood first."""
     overall, share = unit.validation.overall, error_percent(unit.validation)
     gain = overall.improvement_over_static_percent
     loop = max((rate.hysteresis_compensated_percent or 0.0 for rate in unit.validation.rates), default=0.0)
@@ -97,7 +97,7 @@ def judge(unit: UnitReport) -> Judgement:
 
 
 def _look_into(unit: UnitReport, meanwhile: str = "") -> str:
-    """To diagnose it, and what to do ``meanwhile``; where that was done, to use what its diagnosis is good for."""
+    """Advice to diagnose the unit, with what to do ``meanwhile``; if it was diagnosed, advice to use the diagnosis."""
     if unit.diagnosis is None:
         return f"{meanwhile}diagnose it"
     overall, left_n = unit.validation.overall, unit.diagnosis.extended_force_rmse_n
@@ -107,7 +107,7 @@ def _look_into(unit: UnitReport, meanwhile: str = "") -> str:
 
 
 def headline(judgements: Sequence[Judgement]) -> tuple[Grade, str]:
-    """The whole calibration's grade and one sentence: how many are good, and what is to be done with the rest."""
+    """The whole calibration's grade and one sentence: how many units are good, and what to do about the others."""
     worst = min((one.grade for one in judgements), key=WORST_FIRST.index)
     good = sum(one.grade == "good" for one in judgements)
     if len(judgements) == 1:
@@ -120,5 +120,5 @@ def headline(judgements: Sequence[Judgement]) -> tuple[Grade, str]:
 
 
 def grade_word(grade: Grade) -> str:
-    """The grade in a sentence."""
+    """The grade in words that fit into a sentence."""
     return {"good": "good", "look": "to be looked at", "bad": "not to be used"}[grade]

@@ -1,4 +1,4 @@
-"""The page of a calibration: the verdict first, a card a unit, worst first, and each unit's story below."""
+"""The page of a calibration: the verdict first, then a card for each unit, worst first, and its details below."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CARD_WIDTH, CARD_HEIGHT = 120.0, 56.0
 
 @dataclass(frozen=True, eq=False)
 class UnitCard:
-    """A unit as the page shows it; ``anchor`` is its place there."""
+    """A unit as shown on the page; ``anchor`` is the id to link to."""
 
     unit: UnitReport
     judged: Judgement
@@ -36,22 +36,22 @@ class UnitCard:
 
     @property
     def is_open(self) -> bool:
-        """Whether the unit's story is unfolded from the start."""
+        """Whether the unit's details are unfolded from the start."""
         return self.judged.grade != "good"
 
     @property
     def says(self) -> tuple[str, ...]:
-        """The grade's reason, and how the corrected error compares with the static line's where that is not it."""
+        """The reason of the grade and, unless it is the same, the comparison with the static line."""
         return tuple(dict.fromkeys((self.judged.says, judgement.against_static(self.unit.validation.overall))))
 
     @property
     def left_percent(self) -> float:
-        """What is left, in percent of full scale."""
+        """The rms error after correction, in percent of full scale."""
         return judgement.error_percent(self.unit.validation)
 
 
 def _small_loop(loop: charts.ResidualLoop, most_n: float) -> Markup:
-    """The loop without axes, all units on one scale of ``most_n`` newton either way."""
+    """A small drawing of the loop without axes; all units share a scale of ± ``most_n`` newtons."""
     at_n, errors = loop.at_n, loop.errors_n
     x = CARD_WIDTH * (at_n - at_n[0]) / max(float(np.ptp(at_n)), 1e-12)
     curves = []
@@ -66,7 +66,7 @@ def _small_loop(loop: charts.ResidualLoop, most_n: float) -> Markup:
 
 
 def cards(units: Sequence[UnitReport]) -> list[UnitCard]:
-    """A card a unit, worst first, by grade and then by what is left."""
+    """A card for each unit, sorted by grade and then by remaining error, the worst first."""
     loops = [charts.residual_loops(unit.validation) for unit in units]
     widest, errors = charts.common_limits(units, [loop for own in loops for loop in own])
     made = []
@@ -93,9 +93,9 @@ def write_page(
     commands: Sequence[str] = (),
     session: Sequence[tuple[str, str]] = (),
 ) -> Path:
-    """Write the report to ``path``, whole or not at all, and return it.
+    """Write the report to ``path``, completely or not at all, and return the path.
 
-    ``commands`` made it and what it shows; ``session`` is what a session's card says, by what it is about.
+    ``commands`` reproduce the report and its data; ``session`` are the rows of a session's card, as (topic, text).
     """
     made = cards(units)
     grade, says = judgement.headline([card.judged for card in made])

@@ -1,4 +1,4 @@
-"""What a calibration's page says of one unit."""
+"""The data about one unit from which a calibration's page is made."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from smartshoe.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisLink:
-    """A diagnosis in a sentence, where its own page lies (relative to this one), and what its extended model leaves.
+    """A diagnosis as a sentence, the path of its page (relative to this one), and the error of its extended model.
 
-    ``extended_force_rmse_n`` is judged on data that was not fitted; None where the diagnosis has no such figure.
+    ``extended_force_rmse_n`` is computed on data that was not fitted; None if the diagnosis has no such figure.
     """
 
     says: str
@@ -24,10 +24,10 @@ class DiagnosisLink:
 
 @dataclass(frozen=True, eq=False)
 class UnitReport:
-    """What the page says of one unit; ``identification`` is `Identification.to_dict()`.
+    """One unit of the page; ``identification`` is `Identification.to_dict()`.
 
-    ``files`` are links to what was written or read, by what they are, relative to the page. ``diagnose`` is the
-    command that looks into the unit's error, empty where it has been done.
+    ``files`` are links (label, path relative to the page) to files that were written or read. ``diagnose`` is the
+    command that would diagnose the unit, empty if that was done.
     """
 
     name: str

@@ -1,1 +1,1 @@
-"""What a person sees of a diagnosis: sentences, a table for a terminal, figures, and one self-contained page."""
+"""The report on a diagnosis: sentences, a table for a terminal, figures, and a self-contained page."""

@@ -1,4 +1,4 @@
-"""A diagnosis' charts: the error before and after over time, load, rate, cycles and frequency; what to run next."""
+"""A diagnosis' charts: the error before and after over time, load, rate, cycles and frequency; the load to run next."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LOOP_POINTS = 120
 
 
 def _residuals(found: EvidenceView) -> list[tuple[str, str, Array]]:
-    """Label, colour and residual before and after; one of them where nothing was added."""
+    """Label, colour and residual, before and after; only one of them if nothing was added to the model."""
     before = ("before", BEFORE, found.before)
     return [before, ("after", AFTER, found.after)] if found.is_changed else [("error", BEFORE, found.before)]
 
@@ -43,7 +43,7 @@ def _limits(values: Array) -> tuple[float, float]:
 
 
 def _around(lines: Sequence[Line]) -> tuple[float, float] | None:
-    """A scale about zero that holds the lines with their bands; None where they have no number."""
+    """A scale, symmetric about zero, that contains the lines' bands; None if they contain no number."""
     bands = np.concatenate([band for line in lines for band in (line.low, line.high) if band is not None])
     most = float(np.nanmax(np.abs(bands), initial=0.0))
     return (-1.08 * most, 1.08 * most) if most > 0 else None
@@ -55,7 +55,7 @@ def _line(label: str, colour: str, found: Binned, dashed: bool = False) -> Line:
 
 
 def over_time(found: EvidenceView, unit: str) -> Chart:
-    """The error of every recording, one after the other, before and after on one scale, below the load."""
+    """The error of all recordings, one after the other, before and after on a common scale, below the load."""
     limits = _limits(found.before)
     panels = [Panel("load (N)", [Line("load", found.load_n, "load")], height=90)]
     panels += [
@@ -76,7 +76,7 @@ def over_time(found: EvidenceView, unit: str) -> Chart:
 
 
 def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
-    """The load cycle, or part of the time, on which the baseline is furthest off: what each simulation misses."""
+    """The errors of both simulations in the load cycle, or part of the time, in which the baseline is worst."""
     segment = worst_cycle(traces)
     if segment is None:
         return None
@@ -99,12 +99,12 @@ def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
 
 
 def differs(trace: Trace) -> bool:
-    """Whether the extended model simulates a recording otherwise than the baseline."""
+    """Whether the simulations of the extended model and of the baseline differ for a recording."""
     return not np.array_equal(trace.baseline, trace.extended)
 
 
 def loops(traces: Sequence[Trace], unit: str) -> list[Chart]:
-    """Reading against load less a straight line, loading and unloading apart, at the slowest and the fastest rate."""
+    """Reading minus a straight line over load, loading and unloading separately, at the slowest and fastest rate."""
     return [
         _loop(rate, segment, unit) for rate, segment in loops_at_two_rates(traces) if segment.stop - segment.start > 20
     ]
@@ -131,13 +131,13 @@ def _loop(rate: float, segment: TraceSegment, unit: str) -> Chart:
 
 
 def _along(load_n: Array, values: Array, at_n: Array) -> Array:
-    """(m,) ``values`` of one way through a loop on a grid of loads; NaN beyond the way's ends."""
+    """``values`` of one direction of a loop, interpolated at loads ``at_n`` (m,); NaN beyond the direction's ends."""
     order = np.argsort(load_n, kind="stable")
     return np.asarray(np.interp(at_n, load_n[order], values[order], left=np.nan, right=np.nan))
 
 
 def over_state(found: EvidenceView, unit: str) -> list[Chart]:
-    """The error over load and over reading, loading and unloading apart, and over the rate, before above after."""
+    """The error over load, reading and rate; loading and unloading are separate, and before is above after."""
     reading = "Mean and band of one sd; lines that part between loading and unloading are a loop."
     charts = []
     for title, label, x in (("load", "load (N)", found.load_n), ("the reading", f"reading ({unit})", found.reading)):
@@ -159,7 +159,7 @@ def over_state(found: EvidenceView, unit: str) -> list[Chart]:
 
 
 def _means(found: EvidenceView, x: Array, edges: Array) -> tuple[Array, list[Line]]:
-    """The judged error's means before and after over ``x`` (judged samples,), where there are samples."""
+    """The means of the error before and after over ``x``, both of judged samples; bins without samples are left out."""
     each = [(when, colour, binned(x, residual[found.judged], edges)) for when, colour, residual in _residuals(found)]
     filled = np.isfinite(each[0][2].mean)
     drawn = [(when, colour, Binned(*(v[filled] for v in (one.x, one.mean, one.sd)))) for when, colour, one in each]
@@ -167,7 +167,7 @@ def _means(found: EvidenceView, x: Array, edges: Array) -> tuple[Array, list[Lin
 
 
 def over_cycles(found: EvidenceView, unit: str) -> Chart | None:
-    """The error's mean and spread in each load cycle, before and after; None with one cycle."""
+    """Mean and spread of the error in each load cycle, before and after; None with one cycle."""
     cycle = found.cycle[found.judged]
     if np.ptp(cycle) == 0:
         return None
@@ -179,7 +179,7 @@ def over_cycles(found: EvidenceView, unit: str) -> Chart | None:
 
 
 def over_frequency(found: EvidenceView, unit: str) -> Chart | None:
-    """The error's amplitude spectral density in decibel, before and after; None where there is nothing."""
+    """The amplitude spectral density of the error in decibel, before and after; None if there is nothing to show."""
     made = [(when, colour, *spectrum(found, residual)) for when, colour, residual in _residuals(found)]
     made = [one for one in made if one[2].size > 1]
     if not made:
@@ -194,7 +194,7 @@ def over_frequency(found: EvidenceView, unit: str) -> Chart | None:
 
 
 def faults(diagnosis: Diagnosis) -> list[Chart]:
-    """Reading and load of each recording with faults, which are shaded; what was left out of every fit is bare."""
+    """Load and reading of each recording with faults; faults are shaded, and samples left out of every fit are gaps."""
     charts: list[Chart] = []
     for trace in diagnosis.traces:
         own = [fault for fault in diagnosis.data_faults if fault.recording == trace.recording]
@@ -215,7 +215,7 @@ def faults(diagnosis: Diagnosis) -> list[Chart]:
 
 
 def protocol(steps: Protocol) -> Chart:
-    """The load that the protocol asks for, against time."""
+    """The load over time that a protocol prescribes."""
     time_s, load_n = steps.corners()
     says = f"{plain(steps.duration_s / 60)} min, up to {plain(float(np.max(load_n)))} N."
     return Chart("The load to run next", says, "time (s)", time_s, [Panel("load (N)", [Line("load", load_n, "load")])])

@@ -1,4 +1,4 @@
-"""The HTML page of a diagnosis: how far off, why, what it gained, what to do next; then where the error sits."""
+"""The HTML page of a diagnosis: the size of the error, its causes, what was gained, what to do next, and details."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GRADES = {"adequate": "good", "explained": "look", "partly_explained": "look", "
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """A cause as the page shows it."""
+    """A cause as shown on the page."""
 
     title: str
     cause: Cause
@@ -41,10 +41,10 @@ class Card:
 def write_diagnosis_page(
     path: Path, diagnosis: Diagnosis, title: str, facts: Mapping[str, str], protocol_file: str | None = None
 ) -> Path:
-    """Write the page to ``path``, whole or not at all, and return it.
+    """Write the page to ``path``, completely or not at all, and return the path.
 
-    ``facts``: small print by name (files, version). ``protocol_file``: name of the file beside the page that holds
-    the next experiment's protocol.
+    ``facts`` is small print by name (files, version). ``protocol_file`` is the name of the file next to the page that
+    holds the protocol of the next experiment.
     """
     said = sentences.heading(diagnosis), sentence(diagnosis.says)
     following, found = diagnosis.next_experiment, evidence(diagnosis.traces, diagnosis.full_scale_load_n)
@@ -83,21 +83,21 @@ def write_diagnosis_page(
 
 
 def _of_traces(diagnosis: Diagnosis, found: EvidenceView | None) -> dict[str, Any]:
-    """Charts and grids of the signals; empty where no sample can be used."""
+    """Charts and grids of the signals; empty if no sample can be used."""
     traces, unit = diagnosis.traces, diagnosis.unit
     if found is None:
         return {"before_after": [], "over": [], "loops": [], "left": []}
     over = [*charts.over_state(found, unit), charts.over_cycles(found, unit), charts.over_frequency(found, unit)]
     maps = by_load_and_rate(found, found.after, traces), by_place_and_cycle(found, found.after)
     return {
-        "before_after": _there([charts.over_time(found, unit), charts.worst(traces, unit)]),
-        "over": _there(over),
+        "before_after": _without_none([charts.over_time(found, unit), charts.worst(traces, unit)]),
+        "over": _without_none(over),
         "loops": charts.loops(traces, unit),
         "left": grids.left_grids(*maps, unit),
     }
 
 
-def _there(given: Sequence[Chart | None]) -> list[Chart]:
+def _without_none(given: Sequence[Chart | None]) -> list[Chart]:
     return [chart for chart in given if chart is not None]
 
 
@@ -108,7 +108,7 @@ def _value(value: Any) -> str:
 
 
 def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
-    """The baseline's error variance: what each part is called, its colour, its percent."""
+    """The parts of the baseline's error variance, each with its label, colour and percent."""
     part = None if diagnosis.baseline is None else sentences.shares(diagnosis)
     if part is None:
         return []
@@ -120,7 +120,7 @@ def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
 
 
 def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """The few numbers that stand in large letters: (number, what it is)."""
+    """The few figures shown in large letters, as (number, what it is)."""
     before, after = diagnosis.baseline, diagnosis.extended
     if before is None or after is None:
         return []

@@ -1,4 +1,4 @@
-"""A protocol as the text of a scenario's table, to be run as it is."""
+"""Writes a protocol as a table of a scenario, which can be run as it is."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from smartshoe.protocol import Protocol
 
 
 def table_name(name: str) -> str:
-    """``name`` as a bare TOML key and a file's stem: letters, digits, - and _."""
+    """``name`` as a bare TOML key that is also a file's stem: letters, digits, - and _."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "next_experiment"
 
 
 def protocol_text(steps: Protocol, comments: Sequence[str] = ()) -> str:
-    """``[protocol.NAME]`` with its corners (time in s, load in N), ``comments`` as lines before it.
+    """The protocol as ``[protocol.NAME]`` with its corners (time in s, load in N), after ``comments`` as lines.
 
-    Paste it into a scenario; NAME is the protocol's, made a bare key.
+    The text can be pasted into a scenario; NAME is the protocol's name, made a bare key.
     """
     lines = [f"# {line}" for comment in comments for line in textwrap.wrap(comment, 110)]
     lines += [f"[protocol.{table_name(steps.name)}]", 'kind = "segments"', "corners = ["]

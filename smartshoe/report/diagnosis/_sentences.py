@@ -1,4 +1,4 @@
-"""A diagnosis in words: headings, intervals, gains, neighbours; the page and the terminal say the same."""
+"""A diagnosis in words: headings, intervals, gains and similar effects, for both the page and the terminal."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
 
 
 def heading(diagnosis: Diagnosis) -> str:
-    """The verdict, and whether each cause is sure.
+    """The verdict as a heading, which also says if not every cause is sure.
 
-    Where all that is named is of recordings, as a zero is, the plain model allows for it. Nothing is said to be
-    explained by an extension that is rejected.
+    If all causes concern recordings, as a zero does, the plain model is good enough. An extension that was rejected is
+    not said to explain anything.
     """
     if diagnosis.rejected is not None and any(cause.part is not None for cause in diagnosis.causes):
         return REJECTED
@@ -62,14 +62,14 @@ def heading(diagnosis: Diagnosis) -> str:
 
 
 def is_of_recordings(diagnosis: Diagnosis) -> bool:
-    """Whether all that is named is of recordings, as a zero is, for which the plain model allows."""
+    """Whether all causes concern single recordings, as a zero does, which the plain model allows for."""
     before, after = diagnosis.baseline, diagnosis.extended
     is_as_before = before and after and before.rmse == after.rmse
     return bool(diagnosis.causes and is_as_before and diagnosis.rejected is None)
 
 
 def how_sure(cause: Cause) -> str:
-    """The confidence of a cause, and where others may be meant how far it is this one."""
+    """The confidence in a cause and, if equivalent effects are possible, the confidence that it is this one."""
     if not cause.equivalents:
         return f"{sure(cause.confidence)} sure"
     return (
@@ -79,12 +79,12 @@ def how_sure(cause: Cause) -> str:
 
 
 def is_free_form(cause: Cause) -> bool:
-    """Whether the numbers of a cause are those of a free form, since no equation of its kind fits well enough."""
+    """Whether a cause's parameters are those of a free form, because no equation of its kind fits well enough."""
     return cause.part is not None and not {one.name for one in cause.effect.parameters}.issuperset(cause.parameters)
 
 
 def not_in_the_model(cause: Cause) -> str:
-    """What is said beside parameters of an equation in whose place the extended model holds another form; or empty."""
+    """A sentence if the extended model has another form in place of the parameters' equation; '' otherwise."""
     if not cause.parameters or cause.part in (None, cause.name) or is_free_form(cause):
         return ""
     without = ", which has no equation and" if effect(str(cause.part)).is_flexible else ", which"
@@ -95,19 +95,19 @@ def not_in_the_model(cause: Cause) -> str:
 
 
 def meanings(cause: Cause) -> dict[str, str]:
-    """What each parameter of a cause is, by name; of a free form, its own; empty where the catalogue does not say."""
+    """The meaning of each parameter of a cause, by name; '' if the catalogue does not describe it."""
     valued = cause.effect if cause.part is None else effect(cause.part)
     says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
     return {name: says.get(name, "") for name in cause.parameters}
 
 
 def unit_of(symbol: str) -> str:
-    """A unit behind its number; nothing for a pure number."""
+    """A unit as text after a number; '' for a pure number."""
     return "" if symbol in ("", "1") else f" {symbol}"
 
 
 def interval(value: float, low: float, high: float) -> str:
-    """``value [low, high]``, all to two digits of half the interval's width."""
+    """``value [low, high]``, all rounded to two digits of half the interval's width."""
     half = 0.5 * (high - low)
     if not all(math.isfinite(number) for number in (value, low, high)) or half <= 0:
         return plain(value, 4)
@@ -119,13 +119,13 @@ def interval(value: float, low: float, high: float) -> str:
 
 
 def _rounded(value: float, places: int) -> str:
-    """``value`` to ``places``, or to a digit where nothing but zeros would be left of it."""
+    """``value`` to ``places`` decimals, or to one significant digit if only zeros would be left."""
     said = f"{value:.{places}f}"
     return plain(value, 1) if value != 0 and float(said) == 0 else said.replace("-", "−")
 
 
 def two_numbers(first: float, second: float) -> tuple[str, str]:
-    """Two numbers to as many digits as it takes to see that they differ, three to five."""
+    """Two numbers with as many digits, three to five, as are needed to show that they differ."""
     for digits in (3, 4, 5):
         said = plain(first, digits), plain(second, digits)
         if said[0] != said[1]:
@@ -134,9 +134,9 @@ def two_numbers(first: float, second: float) -> tuple[str, str]:
 
 
 def parameter_text(parameter: Parameter) -> str:
-    """Value, 95 % interval and unit; a parameter without an interval was held where it is.
+    """Value, 95 % interval and unit; a parameter without an interval was held fixed.
 
-    One whose interval is cut off at both ends by its bounds is not determined: any value that it may have will do.
+    A parameter whose interval is cut off at both ends by its bounds is not determined.
     """
     low, high = parameter.ci95
     if low == high:
@@ -149,7 +149,7 @@ def parameter_text(parameter: Parameter) -> str:
 
 
 def gain_text(gain: Gain) -> str:
-    """By how many percent the error falls, with its interval; below zero it rises."""
+    """By how many percent the error falls, with its interval; negative if it rises."""
     return _percent_text(gain.gain_percent, *gain.ci95)
 
 
@@ -161,7 +161,7 @@ def _percent_text(percent: float, low: float, high: float) -> str:
 
 
 def _way_of(gain: Gain) -> tuple[bool, float, float, float]:
-    """Whether the error rises; by how many percent it does, or falls, and the interval of that."""
+    """Whether the error rises; then by how many percent it rises or falls, and the interval of that."""
     low, high = gain.ci95
     if gain.gain_percent < 0:
         return True, -gain.gain_percent, -high, -low
@@ -169,7 +169,7 @@ def _way_of(gain: Gain) -> tuple[bool, float, float, float]:
 
 
 def gain_sentence(gain: Gain) -> str:
-    """The error without and with something, on data that was not fitted."""
+    """The error without and with an addition, on data that was not fitted, as a sentence."""
     if not math.isfinite(gain.gain_percent):
         return "What it gains on data that was not fitted is not known."
     without, within = two_numbers(gain.rmse_before, gain.rmse_after)
@@ -182,12 +182,12 @@ def gain_sentence(gain: Gain) -> str:
 
 
 def share_of_full_scale(diagnosis: Diagnosis, value: float) -> float:
-    """``value`` (reading's unit) in percent of the full-scale reading; NaN where that is not known."""
+    """``value`` (in the reading's unit) in percent of the full-scale reading; NaN if that is unknown."""
     return 100.0 * value / diagnosis.full_scale_reading if diagnosis.full_scale_reading > 0 else math.nan
 
 
 def how_much(diagnosis: Diagnosis) -> str | None:
-    """One sentence: the error on held-out data before and after, in the reading's unit and of full scale."""
+    """One sentence: the error on held-out data before and after, in the reading's unit and in percent of full scale."""
     before, after = diagnosis.baseline, diagnosis.extended
     if before is None or after is None:
         return None
@@ -206,7 +206,7 @@ def how_much(diagnosis: Diagnosis) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of the comparison: the figure's name, before, after, and the change in percent (None: no sense in one)."""
+    """A row of the comparison: the name of the figure, before, after, and the change in percent ('' if meaningless)."""
 
     name: str
     before: str
@@ -215,7 +215,7 @@ class Row:
 
 
 def comparison(diagnosis: Diagnosis) -> list[Row]:
-    """The baseline and the extended simulation, side by side, on held-out data."""
+    """The baseline and the extended simulation compared on held-out data."""
     before, after = diagnosis.baseline, diagnosis.extended
     if before is None or after is None:
         return []
@@ -237,7 +237,7 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
     if math.isfinite(before.force_rmse_n) and math.isfinite(after.force_rmse_n):
         by_baseline = diagnosis.force_model is not None and all(
             part.effect.shifts for part in diagnosis.force_model.parts
-        )  # a model that passes only some effects over has an error of its own
+        )  # a model that handles only some of the effects has an error of its own
         rows.append(
             Row(
                 "error of the compensated force, rms" + _but_for_clipped(diagnosis),
@@ -269,7 +269,7 @@ def _but_for_clipped(diagnosis: Diagnosis) -> str:
 
 
 def what_was_gained(diagnosis: Diagnosis) -> str:
-    """What was added to the baseline, and by how much the error on held-out data is lower, or higher, for it."""
+    """What was added to the baseline, and by how much it lowers or raises the error on held-out data."""
     names, others = [in_words(cause.name) for cause in diagnosis.causes], diagnosis.minor_in_words
     if not (names or others):
         return "Nothing was added."
@@ -291,7 +291,7 @@ def what_was_gained(diagnosis: Diagnosis) -> str:
 
 
 def _of_scale(diagnosis: Diagnosis, standing: GoodnessOfFit, value: float) -> str:
-    """A figure of ``standing`` in the reading's unit, and of full scale."""
+    """A value of ``standing`` in the reading's unit, and in percent of full scale."""
     return f"{with_unit(plain(value), standing.unit)} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
 
 
@@ -303,7 +303,7 @@ def _change(before: float, after: float) -> str:
 
 
 def on_causes(diagnosis: Diagnosis) -> list[str]:
-    """How the causes' numbers and words are to be read."""
+    """Sentences on how to read the causes' numbers and words."""
     model, said = diagnosis.model, [INTERVALS]
     if model is not None and model.full_scale_reading * model.gain <= 0.0:
         said.append(TURNED_OVER)
@@ -314,7 +314,7 @@ def on_causes(diagnosis: Diagnosis) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Neighbour:
-    """Another effect that a cause might be: what it is, how likely beside the cause, what would tell the two apart."""
+    """Another effect that a cause might be: meaning, likelihood relative to the cause, and how to distinguish them."""
 
     name: str
     says: str
@@ -323,7 +323,7 @@ class Neighbour:
 
 
 def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
-    """What is known of the effects ``names`` beside ``cause``."""
+    """The effects ``names`` compared with ``cause``."""
     rivals = {rival.effect: rival for rival in cause.rivals}
     known = catalogue()
     found = []
@@ -342,12 +342,12 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
 
 
 def ruled_out(cause: Cause) -> list[Neighbour]:
-    """The effects that came near and can be ruled out."""
+    """The rivals that fitted nearly as well but can be ruled out."""
     return neighbours(cause, [rival.effect for rival in _others(cause) if not rival.may_be_likelier])
 
 
 def likelier(cause: Cause) -> list[Neighbour]:
-    """The effects that alone in the place of a cause would be as likely or likelier, though nothing else says so."""
+    """The effects that alone, in the place of a cause, would be as likely or likelier, without other support."""
     return neighbours(cause, [rival.effect for rival in cause.as_likely])
 
 
@@ -356,13 +356,13 @@ def _others(cause: Cause) -> list[Rival]:
 
 
 def nearest_told(cause: Cause) -> Rival | None:
-    """The rival of which `why_this_one` says how likely it is: beside equivalents only one that may be likelier."""
+    """The rival that `why_this_one` mentions; if there are equivalents, only one that may be likelier."""
     nearest = next(iter(_others(cause)), None)
     return None if nearest is None or (cause.equivalents and not nearest.may_be_likelier) else nearest
 
 
 def why_this_one(cause: Cause) -> str:
-    """One sentence on how far the name can be trusted against its neighbours."""
+    """One sentence on how far the name can be trusted against similar effects."""
     nearest = nearest_told(cause)
     if nearest is None:
         told = "no other effect of the catalogue comes near"
@@ -382,7 +382,7 @@ def why_this_one(cause: Cause) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """Percent of the baseline's held-out error variance."""
+    """Parts of the baseline's held-out error variance, in percent."""
 
     explained: float
     left: float
@@ -390,9 +390,9 @@ class Shares:
 
 
 def shares(diagnosis: Diagnosis) -> Shares | None:
-    """How the baseline's error divides into what was explained, what could be, and what is noise; the sum is 100.
+    """The baseline's error divided into what was explained, what could be, and noise; the sum is 100.
 
-    None where no test could have told structure from noise.
+    None if no test could distinguish structure from noise.
     """
     if diagnosis.extended is not None and not math.isfinite(diagnosis.extended.structure_rms):
         return None
@@ -402,21 +402,21 @@ def shares(diagnosis: Diagnosis) -> Shares | None:
 
 
 def followed(diagnosis: Diagnosis) -> str:
-    """What is said of the part of the error that the extended model does away with: explained, if anything has a name.
+    """The word for the part of the error that the extended model removes: explained, if any effect in it has a name.
 
-    Where only effects without a name follow it, nothing is explained.
+    If only unnamed effects remove it, nothing is explained.
     """
     is_named = diagnosis.causes or not diagnosis.minor
     return "explained" if is_named else "followed by effects that have no name"
 
 
 def percent_of_whole(percent: float) -> str:
-    """A share that is not said to be all before it is."""
+    """A share as text, which says "over 99 %" for a share just below the whole."""
     return "over 99 %" if 99.0 < percent < 100.0 else f"{percent:.0f} %"
 
 
 def shares_text(diagnosis: Diagnosis) -> str:
-    """The same in a sentence."""
+    """The shares of the error's variance in a sentence."""
     part = shares(diagnosis)
     if part is None:
         said = percent_of_whole(diagnosis.explained_percent) if diagnosis.explained_percent >= 0.5 else "none"
@@ -431,9 +431,9 @@ def shares_text(diagnosis: Diagnosis) -> str:
 
 
 def what_is_left(diagnosis: Diagnosis) -> str:
-    """Where what is left sits, and which model leaves it; empty where nothing is said.
+    """Where the remaining structure lies, and which model leaves it; '' if nothing is known.
 
-    Where no cause is named and effects without a name leave less than the baseline, it is the baseline's.
+    If no cause is named and unnamed effects leave less than the baseline, it is the baseline's.
     """
     before, after = diagnosis.baseline, diagnosis.extended
     if not diagnosis.leftover:
@@ -448,7 +448,7 @@ def what_is_left(diagnosis: Diagnosis) -> str:
 
 
 def nothing_left(diagnosis: Diagnosis) -> str:
-    """What is said of the structure that is left where the verdict asks no more of it: none, or how much it is."""
+    """A sentence on the remaining structure if the verdict does not require more: none, or how much there is."""
     after = diagnosis.extended
     if after is None or not math.isfinite(after.structure_rms):
         return "There is too little data to tell structure from noise in what is left."
@@ -463,7 +463,7 @@ def nothing_left(diagnosis: Diagnosis) -> str:
 
 
 def why_no_name(diagnosis: Diagnosis) -> str:
-    """Why an adequate simulation needs no cause: by what a good unit has, or by what was asked to count."""
+    """Why an adequate simulation needs no cause: its error is within a unit's usual imperfections or the tolerance."""
     decided = diagnosis.thresholds
     most = "small imperfections of a good unit, or faults of the data, add up to"
     if decided.material > decided.tolerable:
@@ -472,7 +472,7 @@ def why_no_name(diagnosis: Diagnosis) -> str:
 
 
 def fault_text(fault: DataFault) -> str:
-    """Kind, place, share and what it means."""
+    """A fault as text: its kind, place and share of the samples, and its meaning."""
     span = (
         f"{fault.start_s:.1f}–{fault.stop_s:.1f} s" if fault.stop_s - fault.start_s >= 0.1 else f"{fault.start_s:.2f} s"
     )
@@ -481,12 +481,12 @@ def fault_text(fault: DataFault) -> str:
 
 
 def file_name(label: str) -> str:
-    """A recording's label without the folders before it."""
+    """A recording's label without its folders."""
     return PurePath(label).name or label
 
 
 def share_text(share: float) -> str:
-    """A fraction in percent."""
+    """A fraction as text in percent."""
     if share >= 0.9995:
         return "all"
     return f"{plain(100 * share, 2)} %" if share >= 5e-5 else "under 0.01 %"

@@ -1,4 +1,4 @@
-"""A diagnosis as files: the page, the result and the protocol of the next experiment."""
+"""Writes a diagnosis as files: the page, the result as JSON, and the protocol of the next experiment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def publish_diagnosis(
 ) -> dict[str, Path]:
     """Write ``diagnosis.html``, ``diagnosis.json`` and the next protocol below ``folder``.
 
-    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns those to tell of, by what
+    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns the paths to report, by what
     they are.
     """
     page = folder / "diagnosis.html"

@@ -1,4 +1,4 @@
-"""What stands in coloured tables and bars: effects by what they could take off, how alike they look, what is left."""
+"""Data for coloured tables and bars: effects by what they could explain, their likeness, and what is left."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from smartshoe.report.numbers import plain
 Kind = Literal["cause", "equivalent", "minor", "other"]
 
 MOST_BARS, MOST_ALIKE = 12, 10
-ALIKE = 0.95  # of the likeness: beyond it only a full fit can tell two effects apart, if at all
+ALIKE = 0.95  # likeness beyond which only a full fit can tell two effects apart, if at all
 SAYS: dict[Kind, str] = {
     "cause": "named as a cause, or stands for one", "equivalent": "cannot be told from a cause",
     "minor": "in the extended model, without a name", "other": "not chosen",
@@ -26,7 +26,7 @@ SAYS: dict[Kind, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """An effect, what it alone could take off the error (in −2 log likelihood), and that over the largest."""
+    """An effect with the fall of −2 log likelihood that it alone could cause, and that in percent of the largest."""
 
     name: str
     fall: float
@@ -35,12 +35,12 @@ class Bar:
 
     @property
     def says(self) -> str:
-        """What became of the effect."""
+        """What the diagnosis made of the effect."""
         return SAYS[self.kind]
 
 
 def ranked(diagnosis: Diagnosis) -> list[Bar]:
-    """Effects by what each alone could take off the baseline's error, the strongest first."""
+    """Effects by the fall of the baseline's −2 log likelihood that each alone could cause, the largest first."""
     falls = [(name, fall) for name, fall in diagnosis.screening if np.isfinite(fall) and fall > 0][:MOST_BARS]
     kinds: dict[str | None, Kind] = dict.fromkeys(diagnosis.minor, "minor")
     kinds |= {name: "equivalent" for cause in diagnosis.causes for name in cause.equivalents}
@@ -50,9 +50,9 @@ def ranked(diagnosis: Diagnosis) -> list[Bar]:
 
 
 def compared(diagnosis: Diagnosis) -> tuple[list[str], Array] | None:
-    """Names (n,) and how alike they look in this data (n, n): causes, equivalents and rivals, then the strongest.
+    """Names (n,) and likeness in this data (n, n) of causes, equivalents and rivals, then of the strongest effects.
 
-    None where there is nothing to compare.
+    None if there is nothing to compare.
     """
     matrix = diagnosis.likeness
     names = [name for name, _ in diagnosis.screening]
@@ -68,7 +68,7 @@ def compared(diagnosis: Diagnosis) -> tuple[list[str], Array] | None:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A number in a coloured table: its text, how deep its colour is (0 to 100), and whether it is below zero."""
+    """A cell of a coloured table: its text, depth of colour (0 to 100), and whether its number is negative."""
 
     text: str
     depth: int
@@ -78,7 +78,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A coloured table: a heading, what its columns and rows are, and rows of cells, each after its label."""
+    """A coloured table: a title, labels for columns and rows, and rows of cells, each with its label."""
 
     title: str
     across: str
@@ -88,7 +88,7 @@ class Grid:
 
 
 def likeness(diagnosis: Diagnosis) -> Grid | None:
-    """How alike the effects look, as a table: 1 cannot be told apart."""
+    """The likeness of the effects as a table; effects with 1 cannot be told apart."""
     found = compared(diagnosis)
     if found is None:
         return None
@@ -108,7 +108,7 @@ def likeness(diagnosis: Diagnosis) -> Grid | None:
 
 
 def left_grids(by_load: Map | None, by_cycle: Map | None, unit: str) -> list[Grid]:
-    """The means of what is left over load and rate, and over the course of the cycles, on one scale of colours."""
+    """The mean remaining error over load and rate, and over the course of the cycles, on one colour scale."""
     given = [
         (by_load, "Over load and rate", "rate of the ramp (N/s), unloading negative", "load (N)"),
         (by_cycle, "Over the course of each load cycle", "load cycle (number)", "place in the cycle (% of its time)"),
@@ -142,4 +142,4 @@ def _rows(found: Map, limit: float) -> list[tuple[str, list[Cell]]]:
         (f"{plain(a)}–{plain(b)}".replace("-", "−"), [cell(value) for value in row])
         for a, b, row in zip(low, high, found.values, strict=True)
     ]
-    return made[::-1]  # the largest load on top
+    return made[::-1]  # the largest load first

@@ -1,4 +1,4 @@
-"""A diagnosis on a terminal: how far off first, then the verdict, causes, faults, limits, what to do next."""
+"""Prints a diagnosis on a terminal: size of the error, verdict, causes, faults, limits, and what to do next."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ MOST_FAULTS = 12
 
 
 def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
-    """The whole diagnosis as a person reads it; the page of ``--out`` says more."""
+    """Print the whole diagnosis; the page written with ``--out`` has more details."""
     console = new_console()
-    # How far off it is, before whether that is good or bad: what is bad for one purpose is good for another.
+    # The size of the error comes before the verdict: what is bad for one purpose is good for another.
     said = [text for text in (how_much(diagnosis), f"{heading(diagnosis)}.") if text is not None]
     console.print(f"{title}: {said[0]}" if title else said[0], style="bold", soft_wrap=True)
     for text in (*said[1:], sentence(diagnosis.says)):
@@ -59,7 +59,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
         console.print(table)
         _line(console, shares_text(diagnosis))
     _several(console, "faults of the data", [fault_text(fault) for fault in diagnosis.data_faults])
-    # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
+    # Recordings left out may be many, a line each, so the limits come first.
     of_the_force = diagnosis.limits_of_the_force
     others = [one for one in diagnosis.limits_of_the_rest if one not in of_the_force]
     _several(console, "where the calibration's force may be off", of_the_force, most=None)
@@ -70,7 +70,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
 
 
 def print_design(design: Design) -> None:
-    """Which effects protocols show and tell apart, before anything is measured."""
+    """Print which effects protocols show and distinguish, before anything is measured."""
     console = new_console()
     table = _wrapping(
         f"what these protocols tell of an effect of {100 * design.strength:g} % of full scale",
@@ -92,7 +92,7 @@ def print_design(design: Design) -> None:
 
 
 def _channels(words: Collection[str]) -> str:
-    """What must be logged, by the words of the catalogue; those of another package's own as they are."""
+    """What must be logged, in words of the catalogue; requirements of other packages are shown as they are."""
     said = {str(word): text for word, text in SAYS.items()}
     return " and ".join(said.get(word, word) for word in sorted(words))
 
@@ -102,7 +102,7 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
         "causes, the largest first; errors on data that was not fitted; 95 % intervals in brackets",
         ["cause", "parameter", "value", "error falls by", "sure", "or it is"],
     )
-    table.columns[2].no_wrap = console.width >= USUAL  # a number and its interval on one line, where there is room
+    table.columns[2].no_wrap = console.width >= USUAL  # a number and its interval on one line, if there is room
     for cause in diagnosis.causes:
         shown = [(words(name), parameter_text(value)) for name, value in cause.parameters.items()] or [("–", "–")]
         if is_free_form(cause):
@@ -128,7 +128,7 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
 
 
 def _wrapping(title: str, columns: Sequence[str]) -> Table:
-    """A table that a narrow terminal folds, and does not cut."""
+    """A table that is folded, not cut, on a narrow terminal."""
     table = table_of(title, columns)
     for column in table.columns:
         column.no_wrap, column.overflow, column.min_width = False, "fold", None
@@ -146,7 +146,7 @@ def _about(cause: Cause) -> str:
 
 
 def _parameters(cause: Cause) -> str:
-    """What each parameter is; of a free form, whose numbers are not shown, nothing."""
+    """The meaning of each parameter; '' for a free form, whose numbers are not shown."""
     if is_free_form(cause):
         return ""
     said = ", ".join(f"{words(name)} ({says})" for name, says in meanings(cause).items() if says)

@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis show, as numbers: the worst cycle, residuals by load, rate, cycle and frequency."""
+"""Numbers for a diagnosis' figures: the worst cycle, and residuals by load, rate, cycle and frequency."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis import Trace
 from smartshoe.signals.loading import Cycle, by_rate, cycles, ramps
 
-SLOPE_S = 0.2  # over which a load's rate is taken
-STANDING_SHARE = 0.004  # of full scale a second: below it the load stands
+SLOPE_S = 0.2  # time over which a load's rate is taken
+STANDING_SHARE = 0.004  # of full scale a second: below it the load counts as constant
 FEWEST_IN_A_BIN = 5
-FEWEST_IN_A_CELL = 15  # of the map over load and rate, where the fastest ramps leave few samples
+FEWEST_IN_A_CELL = 15  # of the map over load and rate, in which the fastest ramps leave few samples
 MOST_BINS, FEWEST_BINS = 24, 4
-ENOUGH = 20_000  # samples of a recording, to find its ramps
-PLACES = 10  # of a cycle, in a map
-MOST_GROUPS = 12  # of cycles, in a map
+ENOUGH = 20_000  # number of samples of a recording that suffices to find its ramps
+PLACES = 10  # number of rows into which a map divides a cycle
+MOST_GROUPS = 12  # largest number of groups of cycles in a map
 
 
 @dataclass(frozen=True, eq=False)
 class Binned:
-    """Mean and standard deviation of a residual in bins about ``x``; NaN in bins of few samples. All (m,)."""
+    """Mean and standard deviation of a residual in bins centred at ``x``, all (m,); NaN in bins with few samples."""
 
     x: Array
     mean: Array
@@ -32,9 +32,9 @@ class Binned:
 
 
 def edges_of(x: Array, bins: int | None = None) -> Array:
-    """(bins + 1,) edges of equal bins between the 0.5th and 99.5th percentile of ``x`` (n,).
+    """Edges (bins + 1,) of equal bins between the 0.5th and 99.5th percentile of ``x`` (n,).
 
-    Where their number is not given, of few samples fewer: loading and unloading share them, and not evenly.
+    By default few samples get fewer bins, since loading and unloading share them unevenly.
     """
     if bins is None:
         bins = min(max(x.size // (4 * FEWEST_IN_A_BIN), FEWEST_BINS), MOST_BINS)
@@ -43,7 +43,7 @@ def edges_of(x: Array, bins: int | None = None) -> Array:
 
 
 def binned(x: Array, values: Array, edges: Array) -> Binned:
-    """``values`` (n,) in bins of ``x`` (n,); what lies beyond the edges counts with the outermost bins."""
+    """``values`` (n,) in bins of ``x`` (n,); values beyond the edges are added to the outermost bins."""
     bins = edges.size - 1
     place = np.clip(((x - edges[0]) / (edges[1] - edges[0])).astype(np.intp), 0, bins - 1)
     count = np.bincount(place, minlength=bins)
@@ -56,10 +56,10 @@ def binned(x: Array, values: Array, edges: Array) -> Binned:
 
 @dataclass(frozen=True, eq=False)
 class EvidenceView:
-    """Every usable sample of every recording, one after the other. All (n,) except ``starts`` and ``names``.
+    """All usable samples of all recordings, one after the other; all arrays are (n,).
 
-    ``time_s`` runs on from recording to recording, each of which begins at its ``starts``. ``before`` and ``after``
-    are measured less simulated reading, ``judged`` marks what was not fitted (everything where nothing was held out).
+    ``time_s`` runs on from one recording to the next; recording k begins at ``starts[k]``. ``before`` and ``after`` are
+    measured minus simulated reading.
     """
 
     time_s: Array
@@ -76,23 +76,23 @@ class EvidenceView:
 
     @cached_property
     def judged(self) -> Mask:
-        """(n,) what was not fitted, or everything where nothing was held out."""
+        """(n,) samples that were not fitted, or all samples if nothing was held out."""
         return self.held_out if self.held_out.any() else np.ones(self.held_out.size, dtype=bool)
 
     @cached_property
     def is_changed(self) -> bool:
-        """Whether anything was added to the baseline."""
+        """Whether the extended model differs from the baseline."""
         return not np.array_equal(self.before, self.after)
 
     @cached_property
     def direction(self) -> Index:
-        """(n,) 1 while loading, -1 while unloading, 0 while the load stands."""
+        """(n,) 1 while loading, -1 while unloading, 0 while the load is constant."""
         still = STANDING_SHARE * self.full_scale_load_n
         return np.sign(np.where(np.abs(self.rate_n_per_s) < still, 0.0, self.rate_n_per_s)).astype(np.intp)
 
 
 def evidence(traces: Sequence[Trace], full_scale_load_n: float) -> EvidenceView | None:
-    """The traces joined; None where no sample can be used."""
+    """Join the traces; None if no sample can be used."""
     columns: list[tuple[Array, ...]] = []
     starts, names = [], []
     clock, first_cycle = 0.0, 0
@@ -141,7 +141,7 @@ def evidence(traces: Sequence[Trace], full_scale_load_n: float) -> EvidenceView 
 
 
 def slope(time_s: Array, load_n: Array) -> Array:
-    """(n,) the load's rate in N/s over `SLOPE_S`."""
+    """The load's rate (n,) in N/s, taken over `SLOPE_S`."""
     if time_s.size < 3:
         return np.zeros(time_s.size)
     step_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
@@ -161,12 +161,12 @@ class TraceSegment:
 
     @property
     def span(self) -> slice:
-        """As a slice."""
+        """The samples as a slice."""
         return slice(self.start, self.stop)
 
 
 def worst_cycle(traces: Sequence[Trace]) -> TraceSegment | None:
-    """The load cycle on which the baseline simulation is furthest off, among those not fitted where there are any."""
+    """The load cycle in which the baseline simulation is worst, among those not fitted if there are any."""
     found: list[tuple[bool, float, TraceSegment]] = []
     for trace in traces:
         edges = np.flatnonzero(np.diff(trace.cycle)) + 1
@@ -188,7 +188,7 @@ def worst_cycle(traces: Sequence[Trace]) -> TraceSegment | None:
 
 
 def loops_at_two_rates(traces: Sequence[Trace]) -> list[tuple[float, TraceSegment]]:
-    """A cycle at the lowest and one at the highest loading rate (N/s), not fitted ones first; empty without cycles."""
+    """A cycle at the lowest and one at the highest loading rate (N/s), preferably not fitted; empty without cycles."""
     owner: dict[int, TraceSegment] = {}
     found: list[Cycle] = []
     for trace in traces:
@@ -208,7 +208,7 @@ def loops_at_two_rates(traces: Sequence[Trace]) -> list[tuple[float, TraceSegmen
 
 @dataclass(frozen=True, eq=False)
 class Map:
-    """Mean residuals ``values`` (rows, columns), NaN where there is no data; ``row_edges`` (rows + 1,)."""
+    """Mean residuals ``values`` (rows, columns), NaN where there is no data; ``row_edges`` is (rows + 1,)."""
 
     values: Array
     columns: tuple[str, ...]
@@ -216,7 +216,7 @@ class Map:
 
 
 def by_load_and_rate(found: EvidenceView, residual: Array, traces: Sequence[Trace], bins: int = 12) -> Map | None:
-    """Mean residual by load (rows, N) and by the rate of the ramp (columns), unloading left, standing in the middle."""
+    """Mean residual by load (rows, N) and rate of the ramp (columns: unloading, constant load, loading)."""
     rates = sorted({abs(_two_digits(rate)) for trace in traces for rate in _rates(trace)})
     if not rates:
         return None
@@ -234,7 +234,7 @@ def by_load_and_rate(found: EvidenceView, residual: Array, traces: Sequence[Trac
 
 
 def by_place_and_cycle(found: EvidenceView, residual: Array) -> Map | None:
-    """Mean residual by place within the load cycle (rows, percent of its time) and by cycle (columns)."""
+    """Mean residual by place within the load cycle (rows, percent of its duration) and by cycle (columns)."""
     numbers = int(found.cycle.max()) + 1
     if numbers < 2:
         return None
@@ -269,7 +269,7 @@ def _two_digits(value: float) -> float:
 
 
 def _merged(rates: Sequence[float], alike: float = 0.25, most: int = 6) -> list[float]:
-    """Rates with those that lie within ``alike`` of each other as one, at most ``most`` of them."""
+    """Rates in which those within ``alike`` of each other are merged; at most ``most`` of them."""
     groups: list[list[float]] = []
     for rate in rates:
         if rate <= 0:
@@ -285,12 +285,11 @@ def _merged(rates: Sequence[float], alike: float = 0.25, most: int = 6) -> list[
 
 
 def spectrum(found: EvidenceView, residual: Array) -> tuple[Array, Array]:
-    """Frequency (m,) in Hz and amplitude spectral density (m,) of the residual, evened out over log frequency.
+    """Frequency (m,) in Hz and amplitude spectral density (m,) of the residual, averaged in bins of log frequency.
 
-    Each recording counts by its duration, as far as its own rate goes. Frequencies at which there is nothing are left
-    out.
+    Each recording is weighted by its duration and contributes up to half its sample rate. Empty bins are left out.
     """
-    from scipy.signal import welch  # a diagnosis has it imported already; a page's start-up need not
+    from scipy.signal import welch  # a diagnosis has imported it already; without one a page should not load it
 
     edges = np.searchsorted(found.time_s, found.starts[1:])
     columns: list[Array] = []

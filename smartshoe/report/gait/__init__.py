@@ -1,1 +1,1 @@
-"""A trial as a table, as figures, as a page and as files."""
+"""The report on a trial: a table on a terminal, charts, a page and files."""

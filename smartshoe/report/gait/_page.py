@@ -1,4 +1,4 @@
-"""The HTML page of a trial: what was done, how, how regular, how hard, and what to be careful with."""
+"""The HTML page of a trial: its activity, figures, charts and flags."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from smartshoe.report.gait import charts, shapes
 from smartshoe.report.gait.terminal import COVERAGE_NOTE, by_foot, depends_on_coverage, weight_mark
 from smartshoe.report.numbers import plain, with_sd
 
-UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # kinds of flags: the numbers mean nothing
+UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # flags: all numbers are meaningless
 
 
 def write_gait_page(path: Path, found: GaitResult, title: str, facts: Mapping[str, str]) -> Path:
-    """Write the page to ``path``, whole or not at all, and return it. ``facts``: small print by name."""
+    """Write the page to ``path``, completely or not at all, and return the path; ``facts`` is small print by name."""
     grade, headline = verdict(found)
     both, by_stride = charts.left_and_right(found), charts.variability(found)
     return write_document(
@@ -62,7 +62,7 @@ def verdict(found: GaitResult) -> tuple[str, str]:
 
 
 def _numbers(found: GaitResult) -> list[tuple[str, str]]:
-    """The few numbers that stand in large letters."""
+    """The few figures shown in large letters, as (number, what it is)."""
     summary: Mapping[str, Any] = found.summary
     said: list[tuple[str, str]] = []
     if summary["cadence_steps_per_min"] is not None:

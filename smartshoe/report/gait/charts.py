@@ -1,4 +1,4 @@
-"""A trial's charts: the mean stride, left beside right, the units, the whole trial, phases, stride by stride."""
+"""A trial's charts: mean stride, left and right, units, the whole trial, phases, and figures stride by stride."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _toe_off(found: GaitResult, foot: FootSeries) -> float:
 
 
 def mean_strides(found: GaitResult) -> list[Chart]:
-    """Each foot's mean stride with a band of one standard deviation, both on one scale."""
+    """Each foot's mean stride with a band of one standard deviation, on a common scale."""
     feet = _walked(found)
     each = {foot.name: _each(found, foot) for foot in feet}
     top = max((float((rows.mean(axis=0) + rows.std(axis=0)).max()) for rows in each.values()), default=1.0)
@@ -67,7 +67,7 @@ def mean_strides(found: GaitResult) -> list[Chart]:
 
 
 def left_and_right(found: GaitResult) -> Chart | None:
-    """Both mean strides over each other and their difference; None with one foot."""
+    """The mean strides of both feet over each other, and their difference; None with one foot."""
     feet = _walked(found)
     if len(feet) < 2:
         return None
@@ -89,7 +89,7 @@ def left_and_right(found: GaitResult) -> Chart | None:
 
 
 def units(found: GaitResult) -> list[Chart]:
-    """The mean load of each unit over the stride, with bands; one chart a foot."""
+    """The mean load of each unit over the stride, with bands; one chart for each foot."""
     charts = []
     for foot in _walked(found):
         rows = overlaid(main_strides(found, foot.name), foot.time_s, foot.load)
@@ -106,7 +106,7 @@ def units(found: GaitResult) -> list[Chart]:
 
 
 def trial(found: GaitResult) -> Chart:
-    """The whole trial against time: each foot, both, and body weight."""
+    """The whole trial over time: the force of each foot and of both, and body weight."""
     feet = list(found.feet.values())
     base = feet[0].time_s
     lines = [
@@ -131,7 +131,7 @@ def _on(base: Array, time_s: Array, values: Array) -> Array:
 
 
 def some_strides(found: GaitResult) -> tuple[float, float] | None:
-    """A window on a few strides in the middle, None without strides."""
+    """A time window that shows a few strides in the middle of the trial; None without strides."""
     own = of_main_activity(found.strides)
     if not own:
         return None
@@ -141,7 +141,7 @@ def some_strides(found: GaitResult) -> tuple[float, float] | None:
 
 
 def phases(found: GaitResult) -> list[Chart]:
-    """Some strides of each foot with their phases as bands."""
+    """A few strides of each foot with their phases as bands."""
     window = some_strides(found)
     if window is None:
         return []
@@ -171,7 +171,7 @@ def _named() -> list[tuple[str, str]]:
 
 
 def memberships(found: GaitResult) -> list[Chart]:
-    """Mean membership in the six phases over the stride, and what fits none."""
+    """Mean membership in the six phases over the stride, and the part that fits none of them."""
     charts = []
     for foot in _walked(found):
         own = main_strides(found, foot.name)
@@ -185,7 +185,7 @@ def memberships(found: GaitResult) -> list[Chart]:
 
 
 def variability(found: GaitResult) -> Chart | None:
-    """Stride time and peak, stride by stride; None with fewer than three strides of each foot."""
+    """Stride time and peak force, stride by stride; None if no foot has three strides."""
     feet = [foot for foot in _walked(found) if len(main_strides(found, foot.name)) > 2]
     if not feet:
         return None

@@ -1,4 +1,4 @@
-"""A trial as files: the page, the result and its tables."""
+"""Writes a trial's result as files: the page, the result as JSON, and tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from smartshoe.gait import GaitResult
 from smartshoe.report.gait._page import write_gait_page
 
 DIGITS = 9  # of a number in the tables of strides and events
-TIME_FORMAT, FORMAT = "%.9g", "%.6g"  # of the forces: a load is not known to a millionth of itself
+TIME_FORMAT, FORMAT = "%.9g", "%.6g"  # formats of the table of forces, whose loads are not known to a millionth
 
 
 def publish_gait(
@@ -21,8 +21,8 @@ def publish_gait(
 ) -> dict[str, Path]:
     """Write ``gait.html``, ``gait.json``, ``strides.csv``, ``events.csv`` and ``forces.csv`` below ``folder``.
 
-    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns them by what they are.
-    ``forces.csv`` is a plain table, a trial again for ``smartshoe gait``.
+    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns the paths by what they are.
+    ``forces.csv`` is a plain table, which ``smartshoe gait`` can read as a trial.
     """
     from smartshoe.version import __version__
 
@@ -45,9 +45,9 @@ def publish_gait(
 
 
 def forces_text(columns: Mapping[str, Any]) -> str:
-    """The plain table of equally long columns, time first; nothing where a number is NaN.
+    """The columns, of equal length with time first, as a plain table; cells are empty where a number is NaN.
 
-    One format for the whole table: pandas, number by number, takes four times as long.
+    One format string serves the whole table; pandas formats number by number and takes four times as long.
     """
     numbers = np.column_stack([np.asarray(values, dtype=float) for values in columns.values()])
     row = ",".join([TIME_FORMAT] + [FORMAT] * (numbers.shape[1] - 1)) + "\n"

@@ -1,4 +1,4 @@
-"""The insoles from above: outlines, units by their peaks, the path of the centre of pressure."""
+"""A drawing of the insoles from above: outlines, peaks of the units, and the path of the centre of pressure."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from smartshoe.gait.insole import OUTLINE, PLACES
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain
 
-MIDDLE = {"left": -0.23, "right": 0.23}  # of each insole's axis, in insole lengths to the right
+MIDDLE = {"left": -0.23, "right": 0.23}  # position of each insole's axis, in insole lengths to the right
 INWARDS = {"left": 1.0, "right": -1.0}
 PATH_POINTS = 45
-SIZE = 100.0  # of an insole's length in the drawing
+SIZE = 100.0  # length of an insole in the drawing
 WIDE, HIGH = 96.0, 110.0
 
 
 def placed(foot: str, centre: Array) -> Array:
-    """Centres (n, 2), along and medial, as points of the drawing (n, 2) in insole lengths."""
+    """Convert centres of pressure (n, 2), along and medial, to points of the drawing (n, 2) in insole lengths."""
     return np.column_stack([MIDDLE[foot] + INWARDS[foot] * centre[:, 1], centre[:, 0]])
 
 
 def paths_of(found: GaitResult, foot: FootSeries) -> tuple[list[Array], Array]:
-    """Each stance's path, and the mean one (`PATH_POINTS`, 2), at 2 to 98 % of stance."""
+    """The path of the centre of pressure in each stance, and their mean (`PATH_POINTS`, 2), at 2 to 98 % of stance."""
     strides = main_strides(found, foot.name)
     if not strides:
         return [], np.zeros((0, 2))
@@ -36,14 +36,14 @@ def paths_of(found: GaitResult, foot: FootSeries) -> tuple[list[Array], Array]:
 
 
 def _points(points: Array) -> Array:
-    """Insole lengths, upwards, as the drawing's units, downwards."""
+    """Convert points in insole lengths, y upwards, to the drawing's units, y downwards."""
     return np.column_stack([WIDE / 2 + SIZE * points[:, 0], HIGH - 5 - SIZE * points[:, 1]])
 
 
 def _outline(foot: str) -> str:
     points = _points(np.array([(MIDDLE[foot] + INWARDS[foot] * medial, along) for along, medial in OUTLINE]))
     slope = (np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)) / 6.0
-    # Catmull-Rom through the points, as cubic Bézier pieces.
+    # A Catmull-Rom curve through the points, as cubic Bézier segments.
     pieces = [f"M{points[0][0]:.1f},{points[0][1]:.1f}"]
     for k in range(len(points)):
         n = (k + 1) % len(points)

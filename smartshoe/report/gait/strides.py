@@ -1,4 +1,4 @@
-"""What a trial's charts, pages and figures take from a result: the strides that count, a foot's whole force."""
+"""What charts, pages and figures use of a trial: the strides that count, and the force on the whole foot."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from smartshoe.gait.summary import of_main_activity
 
 
 def whole_of(foot: FootSeries) -> Array:
-    """The foot's whole force (n,) in N, or the sum of its readings where there is no force."""
+    """The force (n,) in N on the whole foot, or the sum of its units' readings if no force is known."""
     return foot.force_n if foot.force_n is not None else np.asarray(foot.load.sum(axis=1))
 
 
 def main_strides(found: GaitFindings, foot: str) -> list[Stride]:
-    """The foot's strides that the summary counts."""
+    """The foot's strides on which the summary is based."""
     return [stride for stride in of_main_activity(found.strides) if stride.foot == foot]

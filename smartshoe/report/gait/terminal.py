@@ -1,4 +1,4 @@
-"""A trial on a terminal: a short table for a person."""
+"""Prints a trial's result on a terminal, as a short table."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ COVERAGE_NOTE = (
 
 
 def depends_on_coverage(found: GaitFindings) -> bool:
-    """Whether forces of feet rest on a coverage that nobody gave."""
+    """Whether forces on the feet assume a coverage of 1 because none was given."""
     return found.coverage == 1.0 and any(own["mean"] is not None for own in found.figures["peak_n"].values())
 
 
 def weight_mark(found: GaitFindings) -> str:
-    """The star of a body weight that was estimated from loads without a coverage."""
+    """A star for a body weight that was estimated from loads without a coverage, otherwise ''."""
     weight = found.forces.body_weight
     return "*" if weight is not None and weight.source != "given" and depends_on_coverage(found) else ""
 
 
 def _peaks(found: GaitFindings, foot: str) -> str:
-    """The mean peak with its 95 % interval: of the mean over strides, and the estimate's own error."""
+    """The mean peak with its 95 % interval, from the spread over strides and the estimate's own error."""
     own = [stride.peak_n for stride in main_strides(found, foot) if stride.peak_n is not None]
     if len(own) < 2:
         return "–"
@@ -48,7 +48,7 @@ def _cv(spread: dict[str, Any] | None) -> str:
 
 
 def by_foot(found: GaitFindings) -> list[tuple[str, list[str]]]:
-    """Rows of the table: what, and each foot's cell; rows that say nothing are left out."""
+    """Rows of the table, each a name and a cell for each foot; rows without content are left out."""
     summary = found.figures
     feet = list(found.indices)
     mark = "*" if depends_on_coverage(found) else ""
@@ -69,7 +69,7 @@ def by_foot(found: GaitFindings) -> list[tuple[str, list[str]]]:
 
 
 def print_gait(found: GaitFindings, title: str) -> None:
-    """Times and forces by foot, then what concerns both, then the flags."""
+    """Print times and forces by foot, then what concerns both feet, then the flags."""
     summary = found.figures
     table = table_of(f"{title}: {found.activity}; mean (variation)", ["", *found.indices])
     for name, cells in by_foot(found):

@@ -1,1 +1,1 @@
-"""Figures for papers, drawn by matplotlib: imported only where figures are asked for."""
+"""Figures for papers, drawn with matplotlib, which is imported only if figures are asked for."""

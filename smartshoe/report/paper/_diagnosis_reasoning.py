@@ -1,4 +1,4 @@
-"""A diagnosis' reasoning: screening, likeness, what is left."""
+"""Figures of a diagnosis' reasoning: screening of effects, their likeness, and what is left."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CAUSE, EQUIVALENT, OTHER = "#0072B2", "#56B4E9", "#cbd5e1"
 
 
 def screening(diagnosis: Diagnosis) -> Figure | None:
-    """Effects ranked by what each alone could take off the baseline's misfit; causes and their equivalents marked."""
+    """Effects ranked by the fall of −2 log likelihood each alone could cause; causes and equivalents are marked."""
     bars = ranked(diagnosis)
     if not bars:
         return None
@@ -46,7 +46,7 @@ def screening(diagnosis: Diagnosis) -> Figure | None:
 
 
 def likeness(diagnosis: Diagnosis) -> Figure | None:
-    """How alike the effects at the top of the screening look in this data: 1 cannot be told apart."""
+    """The likeness, in this data, of the effects at the top of the screening; with 1 they cannot be told apart."""
     found = compared(diagnosis)
     if found is None:
         return None
@@ -69,7 +69,7 @@ def likeness(diagnosis: Diagnosis) -> Figure | None:
 
 
 def what_is_left(by_load: Map | None, by_cycle: Map | None, unit: str) -> Figure | None:
-    """Maps of the mean residual that the extended simulation leaves, on one colour scale."""
+    """Maps of the mean residual of the extended simulation, on one colour scale."""
     maps: list[tuple[Map, str, str, str]] = []
     if by_load is not None:
         maps.append((by_load, "over load and rate", "rate of the ramp (N/s), unloading left", "load (N)"))
@@ -97,7 +97,7 @@ def what_is_left(by_load: Map | None, by_cycle: Map | None, unit: str) -> Figure
 
 
 def _cells(axis: Any, values: Array, colours: str, low: float, high: float, edges: Array | None = None) -> Any:
-    """Coloured cells, the first row on top where rows are names, at the bottom where they are numbers."""
+    """Coloured cells; the first row is on top if rows are names (no ``edges``), at the bottom if they are numbers."""
     rows, columns = values.shape
     up = np.arange(rows + 1) - 0.5 if edges is None else edges
     mesh = axis.pcolormesh(

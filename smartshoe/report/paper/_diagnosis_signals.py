@@ -1,4 +1,4 @@
-"""A diagnosis' signals: simulation beside measurement, loops, and the residual before and after."""
+"""Figures of a diagnosis' signals: simulation and measurement, loops, and the residual before and after."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from smartshoe.report.diagnosis.views import (
 from smartshoe.report.paper.drawing import STYLE, figure_of, thin
 from smartshoe.signals.masks import runs_of
 
-# Okabe and Ito's colours, told apart by colour-blind readers too; the baseline is dashed besides.
+# Okabe and Ito's colours, which colour-blind readers can distinguish; the baseline is also dashed.
 MEASURED, BASELINE, EXTENDED = "#111827", "#D55E00", "#0072B2"
 DIRECTIONS = ((1, "#009E73", "loading"), (-1, "#CC79A7", "unloading"))
 SHADE = "#eef2ff"
 
 
 def beside_measurement(traces: Sequence[Trace], unit: str) -> Figure | None:
-    """The worst cycle that was not fitted and the whole recording around it, with what each simulation is off by."""
+    """The worst cycle that was not fitted and the whole recording around it, with the error of each simulation."""
     worst = worst_cycle(traces)
     if worst is None:
         return None
@@ -65,7 +65,7 @@ def beside_measurement(traces: Sequence[Trace], unit: str) -> Figure | None:
 
 
 def loops(traces: Sequence[Trace], unit: str) -> Figure | None:
-    """Reading against load at a slow and a fast rate; below, less a straight line, where a loop can be seen."""
+    """Reading over load at a slow and a fast rate; below it minus a straight line, so that the loop is visible."""
     chosen = loops_at_two_rates(traces)
     if not chosen:
         return None
@@ -92,7 +92,7 @@ def loops(traces: Sequence[Trace], unit: str) -> Figure | None:
 
 
 def residual_by_course(found: EvidenceView, unit: str) -> Figure:
-    """The residual against time, load cycle and frequency; before above and after below, on the same axes."""
+    """The residual over time, load cycle and frequency; before above and after below, on the same axes."""
     courses = _residuals(found)
     with mpl.rc_context(STYLE):
         figure, axes = _rows_of_three(len(courses))
@@ -125,7 +125,7 @@ def residual_by_course(found: EvidenceView, unit: str) -> Figure:
 
 
 def residual_by_state(found: EvidenceView, unit: str) -> Figure:
-    """The residual against load, reading and rate, loading and unloading apart; before above and after below."""
+    """The residual over load, reading and rate, loading and unloading separately; before above and after below."""
     courses = _residuals(found)
     with mpl.rc_context(STYLE):
         figure, axes = _rows_of_three(len(courses))
@@ -171,7 +171,7 @@ def _simulations(trace: Trace, changed: bool) -> list[tuple[Array, str, str, str
 
 
 def _residuals(found: EvidenceView) -> tuple[tuple[Array, str, str], ...]:
-    """Residual, colour and label before and after; one of them where nothing was added."""
+    """Residual, colour and label, before and after; only one of them if nothing was added to the model."""
     if not found.is_changed:
         return ((found.before, BASELINE, ""),)
     return (found.before, BASELINE, "before\n"), (found.after, EXTENDED, "after\n")
@@ -182,7 +182,7 @@ def _differs(trace: Trace) -> bool:
 
 
 def _short(name: str) -> str:
-    # matplotlib reads a pair of dollar signs as mathematics.
+    # matplotlib would read a pair of dollar signs as mathematics.
     return (name if len(name) <= 28 else f"{name[:27]}…").replace("$", r"\$")
 
 
@@ -197,14 +197,14 @@ def _limit(values: Array) -> float:
 
 
 def _mean_and_band(axis: Any, x: Array, values: Array, colour: str, label: str = "", bins: int | None = None) -> None:
-    """The mean as a line, one standard deviation about it as a band."""
+    """Draw the mean as a line and one standard deviation around it as a band."""
     found = binned(x, values, edges_of(x, bins))
     axis.fill_between(found.x, found.mean - found.sd, found.mean + found.sd, color=colour, alpha=0.15, lw=0)
     axis.plot(found.x, found.mean, color=colour, lw=1.4, marker=".", ms=3.5, label=label)
 
 
 def _held_out_spans(found: EvidenceView) -> list[tuple[float, float]]:
-    """Segments of time that were not fitted; none where all or nothing was."""
+    """Begin and end in s of the segments that were not fitted; none if all or nothing was fitted."""
     mask = found.held_out
     if not mask.any() or mask.all():
         return []

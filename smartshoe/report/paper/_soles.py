@@ -1,4 +1,4 @@
-"""The centre of pressure over drawn insoles: each foot's path, and the butterfly that both feet's load draws."""
+"""The centre of pressure over drawn insoles: each foot's path, and the butterfly curve of both feet."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ MOST_SWAY = 3000
 
 
 def outline(foot: str) -> Path:
-    """The insole as a closed smooth curve, heel at the bottom, seen from above."""
+    """The insole's outline as a closed smooth curve, seen from above with the heel at the bottom."""
     points = np.array([(MIDDLE[foot] + INWARDS[foot] * medial, along) for along, medial in OUTLINE])
     before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
-    # Catmull-Rom through the points, as cubic Bézier pieces.
+    # A Catmull-Rom curve through the points, as cubic Bézier segments.
     slope = (after - before) / 6.0
     vertices, codes = [points[0]], [Path.MOVETO]
     for k in range(len(points)):
@@ -58,7 +58,7 @@ def _plain(axis: Any, title: str) -> None:
 
 
 def centre(found: GaitResult) -> Figure:
-    """Left: each foot's centre of pressure over its insole. Right: that of both feet, drawn side by side."""
+    """Left: each foot's centre of pressure over its insole. Right: that of both feet, as if they stood side by side."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 4.9))
         both = len(found.feet) == 2 and found.total_n is not None
@@ -92,7 +92,7 @@ def centre(found: GaitResult) -> Figure:
 
 
 def _of_both(found: GaitResult) -> Array:
-    """The centre of both feet's load (n, 2) over the strides shown, NaN where neither bears."""
+    """The centre of both feet's load (n, 2) over the strides shown; NaN where neither foot bears load."""
     feet = list(found.feet.values())
     time_s = feet[0].time_s
     own = main_strides(found, feet[0].name)

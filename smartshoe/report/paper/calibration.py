@@ -1,4 +1,4 @@
-"""A unit's figures: signals, loops, the filter's Bode plot, residuals."""
+"""A unit's figures for papers: signals, loops, the filter's Bode plot, residuals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FEWEST = 300
 
 
 def signals(recordings: Sequence[Recording]) -> Figure:
-    """Load and reading against time, one column a recording."""
+    """Load and reading over time, with one column for each recording."""
     with mpl.rc_context(STYLE):
         columns = len(recordings)
         figure, axes = figure_of(9.6, 3.6, columns, 2)
@@ -39,9 +39,9 @@ def signals(recordings: Sequence[Recording]) -> Figure:
 
 
 def loops(traces: Sequence[ForceTrace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> Figure | None:
-    """Raw (best static line) and compensated estimate against load at a low and a high rate, as the paper's Fig. 8.
+    """Raw (best static line) and compensated force over load at a low and a high rate, as in the paper's Fig. 8.
 
-    The nearest rates there are; None where the record has no cycle.
+    The nearest available rates are taken; None if the recordings contain no cycle.
     """
     found = [(trace, cycle) for trace in traces for cycle in cycles(trace.time_s, trace.load_n)]
     groups = by_rate([cycle for _, cycle in found])
@@ -51,7 +51,7 @@ def loops(traces: Sequence[ForceTrace], rates_n_per_s: Sequence[float] = (100.0,
     chosen = sorted({min(groups, key=lambda rate: abs(rate - wanted)) for wanted in rates_n_per_s})
     with mpl.rc_context(STYLE):
         figure, axes = figure_of(9.6, 5.2, len(chosen), 2)
-        # Below each loop its distance from the load: a loop of one percent is no more than a thick line above.
+        # Below each loop its error is drawn: above, a loop of one percent is only a thick line.
         for axis, distance, rate in zip(axes, axes[len(chosen) :], chosen, strict=False):
             cycle = groups[rate][-1]
             trace, span = owner[id(cycle)], slice(cycle.start, cycle.stop)
@@ -76,7 +76,7 @@ def loops(traces: Sequence[ForceTrace], rates_n_per_s: Sequence[float] = (100.0,
 def bode(
     a1: float, b0: float, b1: float, rate_hz: float, numerator: Sequence[float], denominator: Sequence[float]
 ) -> Figure:
-    """Gain and phase of (b0 s + b1)/(s + a1) and of its bilinear filter at ``rate_hz``; gait's band is shaded."""
+    """Gain and phase of (b0 s + b1)/(s + a1) and of its bilinear filter at ``rate_hz``; the band of gait is shaded."""
     frequency = np.geomspace(max(a1 / (2 * np.pi) / 30, 1e-4), 0.499 * rate_hz, 200)
     s = 2j * np.pi * frequency
     z = np.exp(-s / rate_hz)
@@ -103,7 +103,7 @@ def bode(
 
 
 def residuals(traces: Sequence[ForceTrace]) -> Figure:
-    """Compensated force less load, against time and against load."""
+    """Compensated force minus load, over time and over load."""
     with mpl.rc_context(STYLE):
         figure, (by_time, by_load) = figure_of(9.6, 2.8, 2)
         start = 0.0
@@ -121,7 +121,7 @@ def residuals(traces: Sequence[ForceTrace]) -> Figure:
 
 
 def figures_of(unit: UnitReport) -> Iterator[tuple[str, Figure]]:
-    """The unit's figures by name."""
+    """Yield the unit's figures with their names."""
     discrete, parameters = unit.identification["discrete"], unit.identification["parameters"]
     a1, b0, b1 = (parameters[name]["value"] for name in ("a1", "b0", "b1"))
     yield "signals", signals(unit.recordings)
@@ -133,7 +133,7 @@ def figures_of(unit: UnitReport) -> Iterator[tuple[str, Figure]]:
 
 
 def write_figures(folder: Path, units: Sequence[UnitReport], ending: str) -> list[Path]:
-    """Write each unit's figures as ``UNIT_WHAT.ending`` (svg, pdf, png) below ``folder``, and return them."""
+    """Write each unit's figures as ``UNIT_WHAT.ending`` (svg, pdf, png) below ``folder``; returns the paths."""
     return [
         save(figure, folder / f"{unit.name}_{what}.{ending}") for unit in units for what, figure in figures_of(unit)
     ]

@@ -1,4 +1,4 @@
-"""A diagnosis' figures for papers, as files."""
+"""Writes a diagnosis' figures for papers as files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from smartshoe.report.paper.drawing import save
 
 
 def figures_of(diagnosis: Diagnosis) -> Iterator[tuple[str, Figure]]:
-    """The figures by name; those that have nothing to show are left out."""
+    """Yield the figures with their names; those with nothing to show are left out."""
     traces, unit = diagnosis.traces, diagnosis.unit
     found = evidence(traces, diagnosis.full_scale_load_n)
     drawn = {
@@ -36,5 +36,5 @@ def figures_of(diagnosis: Diagnosis) -> Iterator[tuple[str, Figure]]:
 
 
 def write_figures(folder: Path, diagnosis: Diagnosis, ending: str) -> list[Path]:
-    """Write the figures as ``diagnosis_WHAT.ending`` (svg, pdf, png) below ``folder``, and return them."""
+    """Write the figures as ``diagnosis_WHAT.ending`` (svg, pdf, png) below ``folder``; returns the paths."""
     return [save(figure, folder / f"diagnosis_{name}.{ending}") for name, figure in figures_of(diagnosis)]

@@ -1,4 +1,4 @@
-"""What every figure for a paper shares: its look, its thinning, its file."""
+"""What all figures for papers share: style, thinning of lines, and saving."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ STYLE: Any = {
 
 
 def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
-    """At most about `MOST` points that keep each segment's extremes of the first signal."""
+    """Reduce to at most about `MOST` points that keep the extremes of the first signal in each segment."""
     if x.size <= MOST:
         return (x, *signals)
     block = -(-x.size // (MOST // 2))
@@ -44,9 +44,9 @@ def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write the figure in the format of ``path``'s ending (svg, pdf, png), whole or not at all, and return the path.
+    """Write the figure in the format of ``path``'s ending (svg, pdf, png), completely or not at all; returns the path.
 
-    The same bytes every time.
+    The same figure always gives the same bytes.
     """
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(path.suffix[1:])
     with mpl.rc_context(STYLE), replacing(path) as temporary:
@@ -58,6 +58,6 @@ def figure_of(width: float, height: float, columns: int, rows: int = 1) -> tuple
     """A figure of ``width`` by ``height`` inches and its axes, row by row."""
     figure = Figure(figsize=(width, height))
     axes = figure.subplots(rows, columns, squeeze=False)
-    # Fixed margins (in inches over the size): a tight layout would draw every text twice.
+    # Fixed margins (inches divided by the size), since a tight layout would draw every text twice.
     figure.subplots_adjust(0.75 / width, 0.45 / height, 1 - 0.15 / width, 1 - 0.3 / height, 0.25, 0.3)
     return figure, list(axes.ravel())

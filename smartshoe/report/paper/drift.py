@@ -1,4 +1,4 @@
-"""A unit's life as a figure: its parameters at each calibration, the trend, repairs and jumps."""
+"""The history of a unit as a figure: its parameters at each calibration, the trend, repairs and jumps."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ ROW_INCHES = 2.15
 
 
 def draw_drift(drift: Drift) -> Figure:
-    """The figure: one panel a quantity; bars are 95 % of each calibration, the line is the trend of all.
+    """The figure, with a panel for each quantity: calibrations with 95 % error bars, and their trend as a line.
 
-    Dashed: a repair. Red: a jump that no repair explains.
+    A dashed line is a repair, a red band a jump that no repair explains.
     """
     names = shown_names(drift)
     rows = -(-len(names) // COLUMNS)

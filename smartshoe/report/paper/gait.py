@@ -1,4 +1,4 @@
-"""A trial's figures: strides overlaid, the butterfly of both feet, phases as bands, the trial's course."""
+"""A trial's figures for papers: overlaid strides, the butterfly of both feet, phases as bands, the whole trial."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PERCENT = np.linspace(0.0, 100.0, POINTS)
 
 
 def bundle(x: Array, rows: Array, colour: str) -> LineCollection:
-    """Many thin lines (m, n) over ``x`` (n,) as one artist: a line each takes ten times as long to draw."""
+    """Many thin lines (m, n) over ``x`` (n,) as one artist; separate lines would take ten times as long to draw."""
     pieces = np.stack([np.broadcast_to(x, rows.shape), rows], axis=2)
     return LineCollection(list(pieces), colors=colour, linewidths=0.4, alpha=0.25)
 
@@ -46,7 +46,7 @@ def _toe_off(strides: Sequence[Stride]) -> float:
 
 
 def strides(found: GaitResult) -> Figure | None:
-    """Every foot's strides overlaid, with mean and band of one sd; None without strides."""
+    """All strides of each foot overlaid, with mean and a band of one sd; None without strides."""
     feet = [foot for foot in found.feet.values() if main_strides(found, foot.name)]
     if not feet:
         return None
@@ -74,7 +74,10 @@ def strides(found: GaitResult) -> Figure | None:
 
 
 def butterfly(found: GaitResult) -> Figure | None:
-    """Left above and right below one line, mean and band each, and how far they differ; None with one foot."""
+    """The left foot's mean force upwards and the right one's downwards, with bands, and their difference.
+
+    None with one foot.
+    """
     feet = [foot for foot in found.feet.values() if main_strides(found, foot.name)]
     if len(feet) < 2:
         return None
@@ -131,7 +134,7 @@ def regions(found: GaitResult) -> Figure | None:
 
 
 def phases(found: GaitResult) -> Figure | None:
-    """Some strides of both feet with their crisp phases as bands; None without strides."""
+    """A few strides of both feet with their distinct phases as bands; None without strides."""
     own = of_main_activity(found.strides)
     if not own:
         return None
@@ -185,7 +188,7 @@ def memberships(found: GaitResult) -> Figure | None:
 
 
 def course(found: GaitResult) -> Figure:
-    """The whole trial against time: each foot's force, the total, and body weight."""
+    """The whole trial over time: each foot's force, the total, and body weight."""
     with mpl.rc_context(STYLE):
         figure, axes = figure_of(9.6, 4.6, 1, 2)
         figure.subplots_adjust(hspace=0.45)
@@ -219,7 +222,7 @@ def course(found: GaitResult) -> Figure:
 
 
 def variability(found: GaitResult) -> Figure | None:
-    """Stride time and peak, stride by stride; None with fewer than three strides of a foot."""
+    """Stride time and peak force, stride by stride; None if no foot has three strides."""
     feet = [foot for foot in found.feet.values() if len(main_strides(found, foot.name)) > 2]
     if not feet:
         return None
@@ -242,7 +245,7 @@ def variability(found: GaitResult) -> Figure | None:
 
 
 def write_figures(folder: Path, found: GaitResult, ending: str) -> list[Path]:
-    """Write the trial's figures (svg, pdf, png by ``ending``) below ``folder``, and return them."""
+    """Write the trial's figures (svg, pdf, png by ``ending``) below ``folder``; returns their paths."""
     drawn = {
         "trial": course(found), "strides": strides(found), "butterfly": butterfly(found), "units": regions(found),
         "phases": phases(found), "memberships": memberships(found), "centre": centre(found),

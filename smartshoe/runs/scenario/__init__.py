@@ -1,4 +1,4 @@
-"""Scenarios: a TOML file that says which devices, protocols and steps; read, checked and run."""
+"""Scenarios: TOML files that name devices, protocols and analyses; here they are read, checked and run."""
 
 from smartshoe.runs.scenario._keys import Tables, parse_assignments, with_values
 from smartshoe.runs.scenario._run import (

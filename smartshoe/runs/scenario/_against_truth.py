@@ -1,4 +1,4 @@
-"""A trial's forces, events and order of contact against what truly was."""
+"""Compares a simulated trial's forces, events and order of contact with the true ones."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from smartshoe.runs.scenario._trial import TrialEvent, TrialTruth
 
 
-CONTACT = 0.02  # of body weight: a unit bears
-SAME_EVENT_S = 0.1  # further apart, they are not the same event
-EDGE_S = 0.3  # at the end of a trial, where an event may be cut off
+CONTACT = 0.02  # of body weight: level above which a unit bears load
+SAME_EVENT_S = 0.1  # events further apart than this are not the same
+EDGE_S = 0.3  # end of a trial that is ignored, since an event may be cut off there
 ORDER = ("heel", "meta4", "meta1", "toe")
 EVENTS = ("heel_strike", "foot_flat", "heel_off", "toe_off")
 
@@ -25,12 +25,12 @@ EVENTS = ("heel_strike", "foot_flat", "heel_off", "toe_off")
 def compare(
     recording: Recording, truth: TrialTruth, found: GaitResult, raw_foot_n: Mapping[str, Array]
 ) -> dict[str, Any]:
-    """Truth, raw (static gains) and corrected side by side; all forces in N, on the recording's times.
+    """Truth, raw (static gains) and corrected side by side; all forces in N, at the recording's times.
 
-    ``standing_...`` and ``strides_...`` are mean forces over the stretches that the analysis found (None where there
-    are none), ``peaks_n`` means over stances of each foot, ``rmse_total_n`` that of the total over the trial and
-    ``rmse_coils_n`` of what passes through the coils, ``events`` errors in ms, ``order`` the share of stances whose
-    units come in the order heel, meta4, meta1, toe, and of those with meta4 before meta1.
+    ``standing_...`` and ``strides_...`` are mean forces over the spells that the analysis found (None if there are
+    none), ``peaks_n`` means over the stances of each foot, ``rmse_total_n`` the rms error of the total over the trial
+    and ``rmse_coils_n`` that of the load on the coils, ``events`` errors in ms, ``order`` the share of stances in which
+    the units are loaded in the order heel, meta4, meta1, toe, and of those with meta4 before meta1.
     """
     time_s = recording.time_s
     true_foot = {foot: truth.foot_n[:, column] for column, foot in enumerate(truth.feet)}
@@ -80,7 +80,7 @@ def _on(time_s: Array, found: GaitResult, foot: str) -> Array:
 def _rmse_coils(
     time_s: Array, truth: TrialTruth, found: GaitResult, raw_foot_n: Mapping[str, Array]
 ) -> dict[str, float]:
-    """Errors of the load on all coils: what the units get wrong, whatever passes beside them."""
+    """Rms errors in N of the total load on all coils, without regard to what passes beside them."""
     borne_n = truth.load_n.sum(axis=1)
     raw_n = found.coverage * np.sum([raw_foot_n[foot] for foot in truth.feet], axis=0)
     corrected_n = np.zeros(time_s.size)
@@ -100,7 +100,7 @@ def _means(totals: Mapping[str, Array], where: Mask) -> dict[str, float] | None:
 
 
 def _stances(events: Sequence[TrialEvent], foot: str) -> list[tuple[float, float]]:
-    """Begin and end in s of the foot's whole stances."""
+    """Begin and end in s of the foot's complete stances."""
     begun: float | None = None
     spans: list[tuple[float, float]] = []
     for event in events:
@@ -124,7 +124,7 @@ def _mean_peak(time_s: Array, force_n: Array, stances: Sequence[tuple[float, flo
 
 
 def _event_errors(truth: TrialTruth, found: GaitResult, kind: str) -> dict[str, Any]:
-    """Errors of both feet's events of one kind: median and 95th percentile of their size, and how many are wrong."""
+    """Errors of both feet's events of one kind: count, missed and false ones, median and 95th percentile in ms."""
     end_s = float(truth.time_s[-1]) - EDGE_S
     errors: list[Array] = []
     true_count = missed = false = 0
@@ -150,7 +150,7 @@ def _event_errors(truth: TrialTruth, found: GaitResult, kind: str) -> dict[str, 
 
 
 def onsets(time_s: Array, load_n: Array, level_n: float, stances: Sequence[tuple[float, float]]) -> Array:
-    """When (m,) in s the load (n,) first rises through the level in each stance; infinite where it does not."""
+    """Times (m,) in s at which the load (n,) first exceeds the level in each stance; infinite where it does not."""
     times = np.full(len(stances), np.inf)
     for number, (first, last) in enumerate(np.searchsorted(time_s, stances or np.zeros((0, 2)))):
         own = load_n[max(first - 1, 0) : last]

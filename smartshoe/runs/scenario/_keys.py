@@ -1,4 +1,4 @@
-"""A scenario's values by dotted key: ``unit.left_toe.bladder.k1``, ``protocol.dynamic.peak_n``; a unit by its name."""
+"""A scenario's values by dotted key, as ``unit.left_toe.bladder.k1`` or ``protocol.dynamic.peak_n``."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ KeyPath = tuple[str | int, ...]
 
 
 def path_of(tables: Mapping[str, Any], key: str) -> KeyPath:
-    """Where ``key`` stands in a scenario's tables: names of tables, and the index of a unit for its name.
+    """The path of ``key`` in a scenario's tables: names of tables, and for a unit its index instead of its name.
 
-    The last table and the key itself need not be there yet. Raises `ScenarioError` for a unit that is not there and
-    for a key below something that is no table.
+    The last table and the key itself need not exist yet. Raises `ScenarioError` for a unit that does not exist.
     """
     parts = key.split(".")
     if not all(parts):
@@ -32,7 +31,10 @@ def path_of(tables: Mapping[str, Any], key: str) -> KeyPath:
 
 
 def with_values(tables: Tables, values: Mapping[str, Any]) -> Tables:
-    """``tables`` with each value in its place, tables made where they are missing; ``tables`` stays as it was."""
+    """A copy of ``tables`` with ``values`` by key; missing tables are created.
+
+    Raises `ScenarioError` for a key below a value that is not a table.
+    """
     for key, value in values.items():
         tables = _replaced(tables, path_of(tables, key), value, key)
     return tables
@@ -50,7 +52,7 @@ def _replaced(inside: Any, path: Sequence[str | int], value: Any, key: str) -> A
 
 
 def parse_assignments(assignments: Sequence[str]) -> dict[str, Any]:
-    """Values by key from texts ``KEY=VALUE``; a value is TOML, and anything else is taken as a word.
+    """Values by key from texts ``KEY=VALUE``; a value is read as TOML, or as plain text if it is none.
 
     Raises `ScenarioError` for a text without ``=``.
     """

@@ -1,4 +1,4 @@
-"""Carrying a scenario out: devices, protocols, identification, compensation, validation."""
+"""Runs a scenario: devices, protocols, identification, validation, diagnosis, and the trial."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _silent(_: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class UnitResult:
-    """What came out for one unit: its recordings by experiment, and each step's result."""
+    """The result for one unit: its recordings by experiment, and the result of each step."""
 
     name: str
     recordings: dict[str, Recording]
@@ -50,7 +50,7 @@ class UnitResult:
 
     @cached_property
     def identified(self) -> dict[str, Any]:
-        """`Identification.to_dict`, which result, page and terminal all show."""
+        """`Identification.to_dict`, computed once for result, page and terminal."""
         return self.identification.to_dict()
 
     def to_dict(self) -> dict[str, Any]:
@@ -76,7 +76,7 @@ class UnitResult:
 
 @dataclass(frozen=True, eq=False)
 class ScenarioResult:
-    """All units of a scenario, and its trial."""
+    """The results of all units of a scenario, and of its trial."""
 
     scenario: Scenario
     source: Path
@@ -84,7 +84,7 @@ class ScenarioResult:
     trial: TrialResult | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """The whole result: schema ``smartshoe.run/1``."""
+        """The whole result in schema ``smartshoe.run/1``."""
         trial = {"trial": self.trial.to_dict()} if self.trial is not None else {}
         return {
             "schema": "smartshoe.run/1",
@@ -98,7 +98,7 @@ class ScenarioResult:
 
 
 def _seed_of(scenario: Scenario, name: str) -> int:
-    """A unit's own seed: it depends on the unit's name, so that adding a unit leaves the others' noise alone."""
+    """A seed for one unit, from its name only, so that adding a unit does not change the others' noise."""
     return int(np.random.SeedSequence([scenario.seed, zlib.crc32(name.encode())]).generate_state(1)[0])
 
 
@@ -114,9 +114,9 @@ def protocols_of(scenario: Scenario, source: ScenarioText) -> dict[str, Protocol
 
 
 def noise_of(scenario: Scenario, source: ScenarioText) -> tuple[str, float] | None:
-    """The unit with the largest ``sensor.noise_percent`` above zero and that number, None where none is stated.
+    """The unit with the largest ``sensor.noise_percent`` above zero and that value; None if no unit states one.
 
-    Raises `ScenarioError` for one that is no number from 0 on.
+    Raises `ScenarioError` for a value that is not a number from 0 on.
     """
     stated = _stated(scenario, source, "sensor", "noise_percent")
     largest, name = max(stated, key=lambda one: one[0], default=(0.0, ""))
@@ -124,13 +124,13 @@ def noise_of(scenario: Scenario, source: ScenarioText) -> tuple[str, float] | No
 
 
 def sample_rate_of(scenario: Scenario, source: ScenarioText) -> float | None:
-    """The lowest ``daq.sample_rate_hz`` above zero that a unit of the scenario states, None where none does."""
+    """The lowest ``daq.sample_rate_hz`` above zero that a unit states; None if no unit states one."""
     stated = _stated(scenario, source, "daq", "sample_rate_hz")
     return min((rate for rate, _ in stated if rate > 0.0), default=None)
 
 
 def _stated(scenario: Scenario, source: ScenarioText, table: str, key: str) -> list[tuple[float, str]]:
-    """What units state under a key of a table of their options, or of the machine's, and whose it is."""
+    """Values that units state, in their own options or the machine's, under a key of a table, with the units' names."""
     found: list[tuple[float, str]] = []
     for index, unit in enumerate(scenario.unit):
         options = {**scenario.machine.options, **unit.options}.get(table)
@@ -169,7 +169,7 @@ def _record(
         return found
     recordings: dict[str, Recording] = {}
     with _machine_of(scenario, source, index) as machine:
-        # Every protocol is checked before the first one moves anything.
+        # All protocols are checked before the first one moves the machine.
         _check_protocols(machine, protocols, source)
         for name, protocol in protocols.items():
             progress(f"{unit.name}: {name}")
@@ -178,7 +178,7 @@ def _record(
 
 
 def _machine_of(scenario: Scenario, source: ScenarioText, index: int) -> TestMachine:
-    """The machine with the unit under it; raises `ScenarioError` for an option that is none."""
+    """The machine with the unit under it; raises `ScenarioError` for an unknown or invalid option."""
     unit = scenario.unit[index]
     options = _beside(source, {**scenario.machine.options, **unit.options})
     try:
@@ -197,7 +197,7 @@ def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], sourc
 
 
 def check_simulated(scenario: Scenario, source: ScenarioText) -> None:
-    """Open every simulated device of the scenario and check its protocols, and move nothing.
+    """Open every simulated device of the scenario and check its protocols, without moving anything.
 
     So a misspelt option is reported before the first experiment. Devices that are not simulated are left alone. Raises
     `ScenarioError`, which points into the scenario.
@@ -209,7 +209,7 @@ def check_simulated(scenario: Scenario, source: ScenarioText) -> None:
 
 
 def check_machines(scenario: Scenario, source: ScenarioText) -> None:
-    """The same of the machines alone, for what is reckoned with their protocols."""
+    """Check the simulated machines alone and their protocols, as in `check_simulated`."""
     protocols = protocols_of(scenario, source)
     if scenario.machine.backend.startswith("sim:"):
         for index, unit in enumerate(scenario.unit):
@@ -219,7 +219,7 @@ def check_machines(scenario: Scenario, source: ScenarioText) -> None:
 
 
 def _beside(source: ScenarioText, options: dict[str, Any]) -> dict[str, Any]:
-    """``options`` with a twin's calibration taken from the scenario's folder, as recordings are."""
+    """``options`` in which the calibration file of a twin is looked up in the scenario's folder, as recordings are."""
     bladder = options.get("bladder")
     if not isinstance(bladder, dict) or not isinstance(bladder.get("twin"), str):
         return options
@@ -227,7 +227,7 @@ def _beside(source: ScenarioText, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def simulate(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:
-    """Only the devices: recordings by unit and experiment."""
+    """Run only the machines: recordings by unit and experiment."""
     protocols = protocols_of(scenario, source)
     return {
         unit.name: _record(scenario, source, index, protocols, progress) for index, unit in enumerate(scenario.unit)
@@ -235,7 +235,7 @@ def simulate(scenario: Scenario, source: ScenarioText, progress: Progress = _sil
 
 
 def simulate_trial(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> RecordedTrial | None:
-    """Only the shoes: what the scenario's trial recorded; None where there is no ``[trial]``."""
+    """Run only the shoes: the recording of the scenario's trial; None if there is no ``[trial]``."""
     if scenario.trial is None:
         return None
     progress(f"{scenario.trial.name}: recording")
@@ -248,7 +248,7 @@ def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str
 
 
 def diagnosed_on(recordings: dict[str, Recording], settings: DiagnoseTable) -> list[Recording]:
-    """The recordings that a diagnosis is fitted to: those in use, or all that are not held out."""
+    """The recordings that a diagnosis is fitted to: those named in ``use``, or all that are not held out."""
     held_out = set(settings.hold_out)
     used = settings.use or tuple(name for name in recordings if name not in held_out)
     return [recordings[name] for name in used if name in recordings]
@@ -257,7 +257,7 @@ def diagnosed_on(recordings: dict[str, Recording], settings: DiagnoseTable) -> l
 def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Diagnosis:
     from smartshoe.diagnosis import diagnose
 
-    # A person knows them by the experiments' names, not by the machine that they all come from.
+    # Without their source recordings are named by experiment, not by the machine they all come from.
     named = {name: one if Path(one.source).is_file() else replace(one, source="") for name, one in recordings.items()}
     return diagnose(
         diagnosed_on(named, settings),
@@ -267,20 +267,20 @@ def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Dia
 
 
 def steps_of(scenario: Scenario) -> int:
-    """How often `run` tells of its progress."""
+    """How often `run` reports its progress."""
     pressed = sum(len(unit.recordings) or len(scenario.protocol) for unit in scenario.unit)
     of_each = 2 + (scenario.diagnose is not None)
     return pressed + of_each * len(scenario.unit) + 2 * (scenario.trial is not None)
 
 
 def run(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> ScenarioResult:
-    """Devices, then identification, calibration and validation of each unit, then the trial.
+    """Run devices, then identification, calibration and validation of each unit, then the trial.
 
     Raises what the steps raise, with the unit's name in front.
     """
     settings = scenario.identify
     results: list[UnitResult] = []
-    # Before the fits, so that a trial that cannot be is refused at once.
+    # Before the fits, so that an impossible trial is refused at once.
     recorded = simulate_trial(scenario, source, progress)
     if recorded is not None:
         calibrated = {unit.name for unit in scenario.unit}

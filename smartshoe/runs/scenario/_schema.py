@@ -1,4 +1,4 @@
-"""What a scenario may say, checked with errors that name the file, the line and the key."""
+"""The tables and keys of a scenario, with errors that name the file, the line and the key."""
 
 from __future__ import annotations
 
@@ -41,23 +41,24 @@ class _Table(BaseModel):
 
 
 class _OpenTable(BaseModel):
-    """A table whose further keys are a device's own, and are checked by it."""
+    """A table whose additional keys are options of a device, which checks them."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
     @property
     def options(self) -> dict[str, Any]:
-        """The keys beside the table's own."""
+        """The additional keys."""
         return dict(self.model_extra or {})
 
 
-FileName = Annotated[str, AfterValidator(lambda name: require_file_name(name, "it"))]  # recordings and results bear it
+FileName = Annotated[str, AfterValidator(lambda name: require_file_name(name, "it"))]  # files are named after it
 
 
 class ProtocolTable(_Table):
-    """``[protocol.NAME]``: the paper's static or dynamic protocol, or a variation of it, or straight lines of load.
+    """``[protocol.NAME]``: the paper's static or dynamic protocol, a variation of it, or straight segments of load.
 
-    ``corners`` of kind "segments" are [time in s, load in N] from [0, 0] on; "hold" and "rest" are lines that stay.
+    With kind "segments", ``corners`` are [time in s, load in N], beginning with [0, 0]; a constant load makes a segment
+    a "hold", or a "rest" at 0 N.
     """
 
     kind: Literal["static", "dynamic", "segments"]
@@ -97,7 +98,7 @@ class ProtocolTable(_Table):
         return self
 
     def build(self, name: str) -> Protocol:
-        """The protocol, named as the table is."""
+        """Build the protocol, named ``name``."""
         if self.kind == "segments":
             return Protocol(name, tuple(_segment(before, after) for before, after in pairwise(self.corners)))
         if self.kind == "static":
@@ -120,7 +121,7 @@ def _segment(before: tuple[float, float], after: tuple[float, float]) -> Segment
 
 
 class MachineTable(_OpenTable):
-    """``[machine]``: the backend's address; every further key is the backend's own and is checked by it."""
+    """``[machine]``: the backend's address; all other keys are options of the backend, which checks them."""
 
     backend: str = "sim:instron"
 
@@ -131,7 +132,7 @@ class MachineTable(_OpenTable):
 
 
 class ColumnsTable(_Table):
-    """``columns``: which columns of a unit's files are what, where names and units do not tell."""
+    """``columns``: the columns of a unit's files, where they cannot be told from names and units."""
 
     time: str | None = None
     force: str | None = None
@@ -145,7 +146,10 @@ def _refuse_reserved(options: dict[str, Any]) -> None:
 
 
 class UnitTable(_OpenTable):
-    """``[[unit]]``: a sensing unit; its recordings are files, or come from the machine (further keys are its)."""
+    """``[[unit]]``: a sensing unit.
+
+    Its recordings are files, or are made by the machine; then all other keys are options of the machine.
+    """
 
     name: FileName
     recordings: tuple[str, ...] = ()
@@ -172,7 +176,7 @@ class IdentifyTable(_Table):
 
 
 class DiagnoseTable(_Table):
-    """``[diagnose]``: which experiments are diagnosed, and which are held out; no table, no diagnosis."""
+    """``[diagnose]``: which experiments are diagnosed and which are held out; optional, as is the diagnosis."""
 
     use: tuple[str, ...] = ()
     hold_out: tuple[str, ...] = ()
@@ -186,13 +190,13 @@ class DiagnoseTable(_Table):
 
 
 class ValidateTable(_Table):
-    """``[validate]``: which experiments are judged."""
+    """``[validate]``: which experiments the calibration is validated on."""
 
     use: tuple[str, ...] = ()
 
 
 class TrialGaitTable(_Table):
-    """``[trial.gait]``: what the analysis is given of the person and the units."""
+    """``[trial.gait]``: what the gait analysis is told about the person and the units."""
 
     body_weight_n: PositiveFloat | None = None
     coverage: float = Field(default=1.0, gt=0.0, le=1.0)
@@ -200,10 +204,10 @@ class TrialGaitTable(_Table):
 
 
 class TrialTable(_OpenTable):
-    """``[trial]``: a person in the shoes. Every further key is the shoe's own and is checked by it.
+    """``[trial]``: a person in the shoes. All other keys are options of the shoe, which checks them.
 
-    ``name`` names the recording's file. A simulated shoe wears the units of the scenario, with their bladders and
-    sensors.
+    ``name`` is the name of the recording's file. A simulated shoe has the units of the scenario, with their bladders
+    and sensors.
     """
 
     name: str = Field(default="trial", max_length=120, pattern=r"^[A-Za-z0-9][A-Za-z0-9_\-]*$")
@@ -236,19 +240,19 @@ class Scenario(_Table):
 
 
 class ScenarioKeyError(ScenarioError):
-    """A key of a scenario is wrong: ``reason`` is what is wrong with it, without file, line and key."""
+    """A key of a scenario is wrong; ``reason`` says why, without file, line and key."""
 
     reason = ""
 
 
 class ScenarioText:
-    """A scenario's text, to turn a path of keys into 'FILE, line N, key K'."""
+    """The text of a scenario file, for error messages of the form 'FILE, line N, key K'."""
 
     def __init__(self, path: Path, text: str) -> None:
         self.path, self.text = path, text
 
     def error(self, keys: tuple[str | int, ...], message: str) -> ScenarioKeyError:
-        """A `ScenarioError` that points at ``keys``."""
+        """A `ScenarioError` whose message points at ``keys``."""
         line = line_of(self.text, keys)
         where = f"{self.path}, line {line}" if line else str(self.path)
         named = ".".join(str(key) for key in keys) or "the file"
@@ -257,7 +261,7 @@ class ScenarioText:
         return made
 
     def from_option(self, error: OptionError, prefix: tuple[str | int, ...]) -> ScenarioKeyError:
-        """What a device says of an option, at the scenario's line."""
+        """Convert a device's error about an option into one that points at the scenario's line."""
         cause = error.__cause__
         return (
             self.from_validation(cause, prefix)
@@ -266,7 +270,7 @@ class ScenarioText:
         )
 
     def from_validation(self, error: ValidationError, prefix: tuple[str | int, ...] = ()) -> ScenarioKeyError:
-        """The first of pydantic's complaints as one sentence."""
+        """Convert the first of pydantic's errors into one that points at the scenario's line."""
         first = error.errors(include_url=False)[0]
         keys = (
             *prefix,
@@ -283,9 +287,9 @@ class ScenarioText:
 
 
 def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, ScenarioText]:
-    """A TOML file's tables as they stand in it, and the file itself; raises `ScenarioError`.
+    """The tables of a TOML file, unchecked, and its text; raises `ScenarioError` if it cannot be read.
 
-    ``what`` says what the file should be. ``scenarios/NAME.toml`` is found wherever smartshoe is installed.
+    ``what`` says in errors what the file should be. ``scenarios/NAME.toml`` is found wherever smartshoe is installed.
     """
     file = Path(path)
     if file.parent == Path("scenarios") and not file.exists():
@@ -296,23 +300,26 @@ def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, Sce
         raise ScenarioError(str(error)) from error
     try:
         return tomllib.loads(text), ScenarioText(file, text)
-    except (ValueError, RecursionError) as error:  # a number of 5000 digits is a ValueError of its own
+    except (ValueError, RecursionError) as error:  # a number of 5000 digits raises a plain ValueError
         raise ScenarioError(f"{file} is not valid TOML: {error}; mend it there") from error
 
 
 def load(path: Path | str, values: Mapping[str, Any] | None = None) -> tuple[Scenario, ScenarioText]:
-    """Read and check a scenario file, ``values`` by dotted key (`smartshoe.runs.scenario._keys`) in its values' places.
+    """Read and check a scenario file, after replacing ``values`` by dotted key (`smartshoe.runs.scenario._keys`).
 
-    Raises `ScenarioError`: what is wrong, with line and key.
+    Raises `ScenarioError`, which says what is wrong, with line and key.
     """
     tables, source = read_tables(path)
     return checked(with_values(tables, values or {}), source), source
 
 
 def checked(tables: Tables, source: ScenarioText) -> Scenario:
-    """The scenario in ``tables``, whatever its ``[sweep]``; raises `ScenarioError`, which points into ``source``."""
+    """Check ``tables`` and return the scenario; ``[sweep]`` is ignored.
+
+    Raises `ScenarioError`, which points into ``source``.
+    """
     try:
-        # A copy: kinds of protocols are filled in on the way.
+        # A copy, since the check fills in the kinds of protocols.
         scenario = Scenario.model_validate(copy.deepcopy({k: v for k, v in tables.items() if k != "sweep"}))
     except ValidationError as error:
         raise source.from_validation(error) from error

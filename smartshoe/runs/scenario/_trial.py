@@ -1,4 +1,4 @@
-"""A scenario's trial: a person in calibrated shoes; raw and corrected forces, against the truth where it is known."""
+"""A scenario's trial: a person in calibrated shoes; raw and corrected forces are compared with the truth, if known."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
     from smartshoe.gait import GaitResult
 
 
-WORN = ("bladder", "sensor")  # of a unit's keys: the rest is the testing machine's
+WORN = ("bladder", "sensor")  # keys of a unit that a shoe needs, too; the others are for the testing machine
 
 
 class TrialEvent(Protocol):
-    """An event that truly was."""
+    """A true event of a simulated trial."""
 
     @property
     def time_s(self) -> float:
-        """When it was, on the recording's clock."""
+        """The event's time on the recording's clock."""
 
     @property
     def foot(self) -> str:
-        """One of the truth's ``feet``."""
+        """The event's foot, one of the truth's ``feet``."""
 
     @property
     def event(self) -> str:
-        """What it was, in the words of `smartshoe.gait`."""
+        """The kind of event, as in `smartshoe.gait`."""
 
 
 class TrialTruth(Protocol):
-    """What a simulated shoe knows beside its readings, as ``truth``; a real shoe has none.
+    """What a simulated shoe knows beside its readings, as its attribute ``truth``; a real shoe has none.
 
-    ``load_n`` (n, units) in the recording's order of units, ``foot_n`` (n, feet) with what passes beside the units.
+    ``load_n`` (n, units) is in the recording's order of units; ``foot_n`` (n, feet) includes the load beside the units.
     """
 
     @property
@@ -73,7 +73,7 @@ class TrialTruth(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RecordedTrial:
-    """What the shoes recorded, and what truly was where they are simulated."""
+    """What the shoes recorded, and the truth if they are simulated."""
 
     recording: Recording
     truth: TrialTruth | None
@@ -96,10 +96,10 @@ class RecordedTrial:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """A trial through calibrated units.
+    """A trial analysed with calibrated units.
 
-    ``raw_foot_n`` maps a foot to its force (n,) by the static gains alone, coverage allowed for as an even share;
-    ``against_truth`` is `smartshoe.runs.scenario._against_truth.compare`'s, None where the truth is not known.
+    ``raw_foot_n`` maps a foot to its force (n,) in N by the static gains alone, divided by the coverage.
+    ``against_truth`` is the result of `smartshoe.runs.scenario._against_truth.compare`, None if the truth is unknown.
     """
 
     name: str
@@ -115,7 +115,7 @@ class TrialResult:
         return self.recorded.recording
 
     def totals_n(self) -> dict[str, Array]:
-        """Both feet's force (n,) on the recording's times: "raw", "corrected" and, where it is known, "truth"."""
+        """Both feet's force (n,) in N at the recording's times: "raw", "corrected" and, if known, "truth"."""
         time_s = self.recording.time_s
         found = {"raw": np.sum(list(self.raw_foot_n.values()), axis=0)} if self.raw_foot_n else {}
         if self.gait.total_n is not None:
@@ -125,7 +125,7 @@ class TrialResult:
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """The trial's part of ``result.json``; ``gait`` is smartshoe.gait/1."""
+        """The trial's part of ``result.json``; ``gait`` is in schema smartshoe.gait/1."""
         return {
             "name": self.name,
             "shoe": self.shoe,
@@ -137,7 +137,7 @@ class TrialResult:
 
 
 def record_trial(scenario: Scenario, source: ScenarioText, seed: int) -> RecordedTrial:
-    """The scenario's trial on its shoe; raises `ScenarioError` for a shoe or an option that is none."""
+    """Record the scenario's trial with its shoe; raises `ScenarioError` for an unknown shoe or option."""
     table = scenario.trial
     if table is None:
         raise UsageError(f"{source.path} has no [trial]: add one")
@@ -150,7 +150,7 @@ def record_trial(scenario: Scenario, source: ScenarioText, seed: int) -> Recorde
 
 
 def opened_shoe(scenario: Scenario, source: ScenarioText, seed: int) -> Shoe:
-    """The trial's shoe, not started yet; raises `ScenarioError` for a shoe or an option that is none."""
+    """The trial's shoe, not started yet; raises `ScenarioError` for an unknown shoe or option."""
     table = scenario.trial or TrialTable()
     options = {"seed": seed, **table.options}
     if table.shoe.startswith("sim:"):
@@ -165,13 +165,13 @@ def opened_shoe(scenario: Scenario, source: ScenarioText, seed: int) -> Shoe:
 
 
 def _beside(source: ScenarioText, shoe: str) -> str:
-    """The shoe's address with a replayed file taken from the scenario's folder, as recordings are."""
+    """The shoe's address, in which a file to replay is looked up in the scenario's folder, as recordings are."""
     scheme, _, target = shoe.partition(":")
     return f"replay:{source.path.parent / target}" if scheme == "replay" else shoe
 
 
 def analyse_trial(table: TrialTable, recorded: RecordedTrial, calibrations: Sequence[Calibration]) -> TrialResult:
-    """Events, strides and forces of the trial by the calibrations; raises what `smartshoe.gait.analyse` raises."""
+    """Analyse the trial with the calibrations; raises what `smartshoe.gait.analyse` raises."""
     from smartshoe.gait import Coverage, analyse
 
     given = table.gait
@@ -186,7 +186,7 @@ def analyse_trial(table: TrialTable, recorded: RecordedTrial, calibrations: Sequ
 
 
 def static_forces(recording: Recording, calibrations: Sequence[Calibration], coverage: float) -> dict[str, Array]:
-    """Each foot's force (n,) in N by the static gains b1/a1, as a table of weights would give it."""
+    """Each foot's force (n,) in N by the static gains b1/a1 alone, without dynamic compensation."""
     by_unit = {calibration.unit: calibration for calibration in calibrations}
     found: dict[str, Array] = {}
     for channel in recording.sensors:

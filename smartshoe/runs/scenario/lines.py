@@ -1,4 +1,4 @@
-"""Where a key of a TOML file stands, so that an error can name its line (tomllib keeps no positions)."""
+"""Finds the line of a key in a TOML file, so that an error can name it (tomllib keeps no positions)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _parts(dotted: str) -> list[str]:
 def key_lines(text: str) -> dict[Path, int]:
     """The 1-based line of every table header and ``key =`` of a TOML text, by path.
 
-    Keys inside an inline table share their parent's line.
+    Keys inside an inline table have the line of their parent.
     """
     found: dict[Path, int] = {}
     counts: dict[Path, int] = {}
@@ -45,7 +45,7 @@ def key_lines(text: str) -> dict[Path, int]:
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
-    """The line of the longest beginning of ``path`` that stands in the text; None where nothing does."""
+    """The line of ``path``, or of its longest leading part in the text; None if there is none."""
     lines = key_lines(text)
     whole = tuple(path)
     for length in range(len(whole), 0, -1):

@@ -1,4 +1,4 @@
-"""A scenario's result as files: the report, the result and a calibration for each unit."""
+"""Writes a scenario's result: the report, the result as JSON and a calibration for each unit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def _publish_diagnosis(
     unit: UnitResult, folder: Path, result: ScenarioResult, figures: str | None
 ) -> DiagnosisLink | None:
-    """The unit's diagnosis in a folder of its own, and its extended calibration beside the plain one."""
+    """Write the unit's diagnosis into a folder of its own, and its extended calibration next to the plain one."""
     from smartshoe.report.diagnosis.folder import publish_diagnosis
 
     found, settings = unit.diagnosis, result.scenario.diagnose
@@ -36,7 +36,7 @@ def _publish_diagnosis(
 
 
 def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
-    """The trial's recording, true loads and own page in a folder of their own."""
+    """Write the trial's recording, true loads and own page into a folder of their own."""
     trial = result.trial
     if trial is None:
         return None
@@ -59,7 +59,7 @@ def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
 def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str | None = None) -> Path:
     """Write ``report.html``, ``result.json`` and ``calibrations/UNIT.json`` below ``folder``; returns the report.
 
-    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none.
+    ``figures`` is the format (svg, pdf, png) of figures for papers; None means no figures.
     """
     calibrations = make_folder(folder / "calibrations")
     for unit in result.units:
@@ -92,7 +92,7 @@ def judged(result: ScenarioResult) -> tuple[str, dict[str, str]]:
 
 
 def _unit_report(result: ScenarioResult, unit: UnitResult, diagnosed: DiagnosisLink | None) -> UnitReport:
-    """What the page says of ``unit``, with the command that diagnoses it where that was not done."""
+    """The report on ``unit``, with the command that would diagnose it if it was not diagnosed."""
     sources = {name: recording.source for name, recording in unit.recordings.items()}
     simulated = not any(Path(source).is_file() for source in sources.values())
     files = [("calibration", f"calibrations/{unit.name}.json"), ("result as JSON", "result.json")]

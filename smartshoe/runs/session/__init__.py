@@ -1,4 +1,4 @@
-"""A calibration session: a unit under a machine, recorded so that nothing is lost, then identified and judged."""
+"""A calibration session: a unit is pressed by a machine, recorded without loss, then identified and validated."""
 
 from smartshoe.runs.session._analysis import SessionResult, analyse
 from smartshoe.runs.session._checks import PressingFault

@@ -1,4 +1,7 @@
-"""From a session's raw data to its result: joined, identified, validated, diagnosed. Nothing else goes in."""
+"""From a session's raw data to its result: the streams are joined, identified, validated and diagnosed.
+
+The result depends on the raw data and the plan alone.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +33,10 @@ def _silent(_: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class SessionResult:
-    """What came out of a session.
+    """The result of a session.
 
-    By experiment ``recordings`` are load and reading on one time base, ``clocks`` how the machine's and the shoe's lay.
+    ``recordings`` maps an experiment to load and reading on one time base, ``clocks`` to the alignment of the machine's
+    clock with the shoe's.
     """
 
     plan: SessionPlan
@@ -47,13 +51,13 @@ class SessionResult:
 
     @property
     def clocks_said(self) -> list[str]:
-        """How the two clocks lay, in words, an experiment each."""
+        """The alignment of the two clocks in words, for each experiment."""
         return [
             f"{name}: beside the shoe's the machine's clock is {clocks.says}" for name, clocks in self.clocks.items()
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema ``smartshoe.session/1``; the same session gives the same bits."""
+        """The result in schema ``smartshoe.session/1``; the same session always gives identical bits."""
         return {
             "schema": "smartshoe.session/1",
             "unit": self.plan.unit,
@@ -95,9 +99,9 @@ class SessionResult:
 
 
 def joined(plan: SessionPlan, attempt: Attempt, *, to_fit: bool = False) -> tuple[Recording, Alignment]:
-    """Load and the unit's reading at the shoe's samples, and the clocks; raises `InputError` where they do not match.
+    """Load and the unit's reading at the shoe's samples, and the clocks; raises `InputError` if they do not match.
 
-    ``to_fit``: at the samples of whichever is slower, so that noise stays white and error bars hold.
+    With ``to_fit`` the samples are those of whichever is slower, so that noise stays white and error bars are valid.
     """
     stream = attempt.stream()
     others = [channel.name for channel in stream.sensors if channel.name != plan.unit]
@@ -110,9 +114,9 @@ def joined(plan: SessionPlan, attempt: Attempt, *, to_fit: bool = False) -> tupl
 
 
 def analyse(folder: SessionFolder, progress: Progress = _silent) -> SessionResult:
-    """Everything that follows from what ``folder`` holds.
+    """Compute the result from what ``folder`` holds.
 
-    Raises `InputError` where an experiment is not done, else what the steps raise.
+    Raises `InputError` if an experiment is not done, otherwise what the steps raise.
     """
     plan = folder.plan
     attempts = folder.attempts()
@@ -160,7 +164,7 @@ def analyse(folder: SessionFolder, progress: Progress = _silent) -> SessionResul
 
 
 def _identified(recordings: list[Recording]) -> tuple[Identification, LeaveOneRateOut | None]:
-    """The fit to everything, and how it does on rates that it has not seen, where there is more than one."""
+    """The fit to all recordings, and its leave-one-rate-out result if they contain more than one loading rate."""
     from smartshoe.identification.leave_out import leave_one_rate_out
 
     try:

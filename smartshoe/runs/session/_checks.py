@@ -1,4 +1,7 @@
-"""What can be wrong with a pressing, seen while the unit still lies under the machine: one function a fault."""
+"""Checks of a pressing for faults, made while the unit still lies under the machine; one function a fault.
+
+The first lines of the docstrings of `AT_THE_END` are shown on the session's page.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,12 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.signals import loading
 from smartshoe.signals.masks import runs_of
 
-FOLLOWS = 0.8  # correlation of a reading with the load that presses it
+FOLLOWS = 0.8  # correlation above which a reading follows the load that presses it
 END_OF_RANGE = 0.995
 SATURATED_SAMPLES = 3
-CONTACT_SHARE = 0.02  # of the sensor's range, by a press
+CONTACT_SHARE = 0.02  # of the sensor's range: the smallest rise of a unit that is touched
 LEAST_REST_S = 0.5
-BRIDGED_S = 0.05  # to the next sample of the stream
+BRIDGED_S = 0.05  # longest time to the nearest sample of the stream for a moment to count as covered
 LARGEST_LOSS = 0.02
 DRIFT_SHARE = 0.02  # of the reading's span
 PEAK_TOLERANCE = 0.05
@@ -31,20 +34,20 @@ PEAK_TOLERANCE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class PressingFault:
-    """A fault of a pressing: ``says`` is what it is and what mends it; where it is not ``grave`` a person may go on."""
+    """A fault of a pressing: ``says`` names it and its remedy; if it is not ``grave``, a person may go on."""
 
     kind: str
     says: str
     grave: bool = True
 
     def to_dict(self) -> dict[str, Any]:
-        """For the journal and JSON."""
+        """The fault as an object for the journal and for JSON."""
         return asdict(self)
 
 
 @dataclass(frozen=True, eq=False)
 class Pressing:
-    """What is known of a pressing: the stream of all units, and, once it is there, the machine's log."""
+    """What is known of a pressing: the stream of all units and, once it exists, the machine's log."""
 
     unit: str
     protocol: Protocol
@@ -53,12 +56,12 @@ class Pressing:
 
     @property
     def reading(self) -> Channel:
-        """The unit's own."""
+        """The reading of the unit under test."""
         return self.stream[self.unit]
 
     @cached_property
     def correlations(self) -> dict[str, float]:
-        """How well each unit's reading follows the load, -1 to 1; empty without a log."""
+        """The correlation of each unit's reading with the load, -1 to 1; empty without a log."""
         if self.load is None:
             return {}
         load = self.load
@@ -69,7 +72,7 @@ class Pressing:
 
     @cached_property
     def alignment(self) -> Alignment | None:
-        """Log and reading on one time base, None where they do not match."""
+        """The alignment of log and reading; None if there is no log or the two do not match."""
         if self.load is None:
             return None
         try:
@@ -78,7 +81,7 @@ class Pressing:
             return None
 
 
-Check = Callable[[Pressing], PressingFault | None]  # looks at a pressing and says what is wrong, or None
+Check = Callable[[Pressing], PressingFault | None]  # examines a pressing and returns what is wrong, or None
 
 
 def saturation(pressing: Pressing) -> PressingFault | None:
@@ -222,7 +225,7 @@ AT_THE_END: tuple[Check, ...] = (
 
 
 def first_fault(checks: tuple[Check, ...], pressing: Pressing) -> PressingFault | None:
-    """The first thing that a check has to say."""
+    """The first fault that one of ``checks`` finds; None if there is none."""
     return next((found for check in checks if (found := check(pressing)) is not None), None)
 
 
@@ -231,6 +234,6 @@ def _span(values: Array) -> float:
 
 
 def _share(channel: Channel) -> float:
-    """The reading's span in shares of its range; without a range in its own unit."""
+    """The span of the reading as a share of its range; in its own unit if the range is unknown."""
     size = 1.0 if channel.range_ is None else channel.range_[1] - channel.range_[0]
     return _span(channel.values) / (size or 1.0)

@@ -1,7 +1,7 @@
-"""`SessionFolder`: everything of a session on disk, so that it can go on after a crash and be judged anew.
+"""`SessionFolder`: all data of a session on disk, so that it can be resumed after a crash and analysed again.
 
-``session.json`` is the plan, ``journal.smj`` every sample and event (`smartshoe.files.journal`), ``raw/`` the
-machine's logs as they came. Results lie beside them and follow from these three alone.
+``session.json`` is the plan, ``journal.smj`` holds every sample and event (`smartshoe.files.journal`), ``raw/`` the
+machine's logs as they came. Results lie next to them and follow from these three alone.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ State = Literal["open", "accepted", "rejected"]
 
 @dataclass(eq=False)
 class Attempt:
-    """One pressing of an experiment: the shoe's blocks, the machine's log, what was found."""
+    """One pressing of an experiment: the shoe's blocks, the machine's log, and the faults that were found."""
 
     experiment: str
     number: int
@@ -51,11 +51,11 @@ class Attempt:
 
     @property
     def samples(self) -> int:
-        """How many samples of the shoe there are."""
+        """Number of samples of the shoe."""
         return sum(len(block) for block in self.blocks)
 
     def stream(self) -> Recording:
-        """All units' readings; raises `InputError` where there are none."""
+        """All units' readings as one recording; raises `InputError` if there are none."""
         blocks = [block for block in self.blocks if len(block)]
         if not blocks:
             raise InputError(f"{self.experiment}, attempt {self.number} holds no samples: press it again")
@@ -68,7 +68,7 @@ class Attempt:
         return Recording(whole.time_s, channels, name=self.experiment)
 
     def load(self) -> Recording:
-        """The machine's log: its load and what else it holds, no reading."""
+        """The machine's log: load and other channels, without any reading of a unit."""
         if self.log is None:
             raise InputError(f"{self.experiment}, attempt {self.number} has no machine's log: press it again")
         found = read(self.log, partly=True, **self.columns)
@@ -82,7 +82,7 @@ def _with_instrument(channel: Channel, described: ChannelDescription) -> Channel
 
 @contextmanager
 def writing_to_disk(what: Path) -> Iterator[None]:
-    """Within the block, a disk that refuses is `InputError` in a sentence: nothing half-written, the rest unharmed."""
+    """Turn an error of the disk within the block into an `InputError`; what was written before is not affected."""
     try:
         yield
     except (OSError, UsageError) as error:
@@ -95,7 +95,7 @@ def writing_to_disk(what: Path) -> Iterator[None]:
 
 
 class SessionFolder:
-    """A session's folder, open for writing (`begin`, `resume`) or only read (`open`)."""
+    """A session's folder, opened for writing (`begin`, `resume`) or only for reading (`open`)."""
 
     def __init__(self, path: Path, plan: SessionPlan, journal: Journal | None) -> None:
         self.path, self.plan = path, plan
@@ -106,10 +106,10 @@ class SessionFolder:
     # -- opening -----------------------------------------------------------------------------------------------
     @classmethod
     def begin(cls, path: Path | str, plan: SessionPlan) -> Self:
-        """A new session; raises `UsageError` where the folder holds one already in which anything was recorded."""
+        """Start a new session; raises `UsageError` if the folder already holds one with recorded samples."""
         folder = make_folder(path)
         make_folder(folder / RAW)
-        # The journal's lock first: whoever holds it may be recording at this moment, into this very file.
+        # Take the journal's lock first: its holder may be recording into this very file at the moment.
         journal = Journal(folder / JOURNAL)
         try:
             if any(record.kind == SAMPLES for record in journal.recovered.records):
@@ -125,7 +125,7 @@ class SessionFolder:
 
     @classmethod
     def resume(cls, path: Path | str) -> Self:
-        """A session that was begun; its journal is recovered to the last whole record."""
+        """Reopen a session for writing; its journal is recovered up to the last complete record."""
         folder = Path(path)
         plan = _plan_of(folder)
         make_folder(folder / RAW)
@@ -133,7 +133,7 @@ class SessionFolder:
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
-        """A session to read only; raises `InputError` where its journal cannot be read."""
+        """Open a session for reading only; raises `InputError` if its journal cannot be read."""
         found = cls(Path(path), _plan_of(Path(path)), None)
         found.notes = read_journal(found.path / JOURNAL).notes
         return found
@@ -155,7 +155,7 @@ class SessionFolder:
         self._append(EVENT, json.dumps({"event": event, **facts}, allow_nan=False).encode())
 
     def note_stream(self, shoe: Shoe) -> None:
-        """What the stream that follows consists of."""
+        """Append a description of the stream that follows: its channels and the shoe's firmware."""
         channels = [
             {
                 "name": c.name,
@@ -167,19 +167,19 @@ class SessionFolder:
             for c in shoe.describe()
         ]
         self.channels = shoe.describe()
-        said = getattr(shoe, "information", None)  # what a live shoe's firmware says of itself
+        said = getattr(shoe, "information", None)  # what a live shoe's firmware reports
         self.note("stream", shoe=str(shoe), channels=channels, information=None if said is None else str(said))
 
     def keep(self, block: Block) -> None:
-        """Append a block of samples; a live shoe's is on disk when this returns.
+        """Append a block of samples; that of a live shoe is on disk when this returns.
 
-        What a virtual clock sends can be had again: it is safe from a kill at once, from a pulled plug with the next
-        event.
+        Samples with a virtual clock can be produced again: they survive a kill at once, a power failure only after the
+        next event.
         """
         self._append(SAMPLES, samples.packed(block), synced=block.arrival_s is not None)
 
     def keep_log(self, log: Recording | Path, name: str, columns: dict[str, Any]) -> None:
-        """Keep the machine's log below ``raw/`` (a file as it is, byte by byte) and note it."""
+        """Store the machine's log below ``raw/`` (a file is copied byte by byte) and append an event about it."""
         target = self.path / RAW / f"{name}{log.suffix if isinstance(log, Path) else '.csv'}"
         with writing_to_disk(target):
             if isinstance(log, Path):
@@ -197,7 +197,7 @@ class SessionFolder:
 
     # -- reading -----------------------------------------------------------------------------------------------
     def attempts(self) -> list[Attempt]:
-        """Every pressing so far, oldest first; raises `InputError` where the journal cannot be understood."""
+        """All pressings so far, oldest first; raises `InputError` if the journal is not valid."""
         contents = read_journal(self.path / JOURNAL)
         with foreign_code(self.path / JOURNAL, "session's journal", "restore it from a copy"):
             return list(self._attempts(iter(contents.records)))
@@ -238,7 +238,7 @@ class SessionFolder:
         return path
 
     def accepted(self) -> dict[str, Attempt]:
-        """The pressing that counts of each experiment that is done."""
+        """The accepted pressing of each experiment that is done."""
         return {attempt.experiment: attempt for attempt in self.attempts() if attempt.state == "accepted"}
 
 

@@ -1,7 +1,7 @@
-"""One test of a machine, from the session's side: begun, then asked now and then whether its log is there.
+"""The machine as a session sees it: a test is started, then its log is polled for.
 
-A machine that moves on its own runs in a thread beside the stream; one on a virtual clock is done at once; one that
-a person starts (Bluehill has no programming interface) is done when its log lies in the folder, whole.
+A machine that moves on its own runs in a thread next to the stream; one with a virtual clock is done at once; one that
+a person starts (Bluehill has no programming interface) is done when its complete log lies in the folder.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ REACHED = 0.95
 
 
 class MachineSide(ABC):
-    """The machine of a session. ``columns`` say how its log is to be read."""
+    """The machine of a session. ``columns`` names the columns of its log."""
 
     by_hand = False
     columns: dict[str, Any]
 
     @abstractmethod
     def check(self, protocol: Protocol) -> None:
-        """Raise `LimitError` where the machine or the sensor does not stand the protocol."""
+        """Raise `LimitError` if the protocol exceeds the limits of the machine or the sensor."""
 
     @abstractmethod
     def start(self, protocol: Protocol) -> None:
-        """Begin the test, or take note that a person begins it now."""
+        """Start the test, or note that a person starts it now."""
 
     @abstractmethod
     def log(self) -> Recording | Path | None:
-        """The test's log once it is done, None before; raises what went wrong."""
+        """The test's log once it is done, None before; raises the error if the test failed."""
 
     def close(self) -> None:  # noqa: B027
-        """Let go of the machine."""
+        """Release the machine."""
 
 
 class RunMachine(MachineSide):
-    """A machine that smartshoe runs."""
+    """A machine that smartshoe controls."""
 
     def __init__(self, machine: TestMachine) -> None:
         self.machine = machine
@@ -60,11 +60,11 @@ class RunMachine(MachineSide):
         self._recording: Recording | None = None
 
     def check(self, protocol: Protocol) -> None:
-        """The machine's own check."""
+        """Check the protocol by the machine's own limits."""
         self.machine.check(protocol)
 
     def start(self, protocol: Protocol) -> None:
-        """Run it, beside the stream where that takes time."""
+        """Run the test, in a thread if it takes time."""
         self._recording = self._failure = self._thread = None
         if self.machine.is_instant:
             self._recording = self.machine.run(protocol)
@@ -73,14 +73,14 @@ class RunMachine(MachineSide):
         def run() -> None:
             try:
                 self._recording = self.machine.run(protocol)
-            except Exception as error:  # handed to the session's thread by `log`
+            except Exception as error:  # `log` raises it in the session's thread
                 self._failure = error
 
         self._thread = Thread(target=run, name=f"{self.machine} runs {protocol.name}", daemon=True)
         self._thread.start()
 
     def log(self) -> Recording | None:
-        """The machine's own log: with the load, without a reading where it has one of that kind."""
+        """The machine's log: one with the load and no reading if there is one, otherwise the recording."""
         if self._thread is not None and self._thread.is_alive():
             return None
         if self._failure is not None:
@@ -98,10 +98,10 @@ class RunMachine(MachineSide):
 
 
 class LogByHand(MachineSide):
-    """A machine whose log arrives as a file, possibly while it grows.
+    """A machine run by hand, whose log arrives as a file and may be read while it still grows.
 
-    ``target`` is the file, or a folder in which each test's log is a new file of ``pattern``. A log counts once it
-    has not changed for `SETTLED_S`, can be read, and has reached the protocol's peak load.
+    ``target`` is the file, or a folder in which each test's log is a new file that matches ``pattern``. A log is
+    complete once it has not changed for `SETTLED_S`, can be read, and has reached the protocol's peak load.
     """
 
     by_hand = True
@@ -123,17 +123,17 @@ class LogByHand(MachineSide):
         return f"{self.target}/{self.pattern}" if self.is_folder else str(self.target)
 
     def check(self, protocol: Protocol) -> None:
-        """Against the Instron 5944's frame."""
+        """Check the protocol by the limits of the Instron 5944."""
         protocol.check(INSTRON_5944)
 
     def start(self, protocol: Protocol) -> None:
-        """From now on the log is looked for."""
+        """Start looking for the log."""
         self._protocol = protocol
         self._started_s = time.time()
         self.reason = f"{self} is not there"
 
     def log(self) -> Path | None:
-        """The log's path once it is whole; ``reason`` says what it waits for."""
+        """The path of the log once it is complete, None before; ``reason`` then says what is missing."""
         if time.monotonic() - self._looked_s < LOOK_EVERY_S or self._protocol is None:
             return None
         self._looked_s = time.monotonic()
@@ -172,7 +172,7 @@ class LogByHand(MachineSide):
         return True
 
     def late(self, wait_s: float) -> SmartShoeError:
-        """Why the wait ends."""
+        """The error for a log that did not come within ``wait_s``."""
         said = f"the machine's log did not come within {wait_s:.0f} s ({self.reason})"
         if self._is_unread:
             return InputError(
@@ -185,7 +185,7 @@ class LogByHand(MachineSide):
 
 
 def machine_at(url: str, shoe: Shoe, unit: str) -> MachineSide:
-    """The machine at ``url`` with ``unit`` of ``shoe`` on its anvil, open."""
+    """The opened machine at ``url``, with ``unit`` of ``shoe`` under it."""
     scheme, target, options = split_url(url)
     if scheme != "log":
         machine = open_machine(url)

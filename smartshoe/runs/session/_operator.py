@@ -1,4 +1,4 @@
-"""`Operator`: whoever stands at the machine; instructions go to it, confirmations and decisions come from it."""
+"""`Operator`: the person at the machine, who gets instructions and gives confirmations and decisions."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ from smartshoe.runs.session._checks import PressingFault
 
 
 class Operator(Interface):
-    """What a session asks of a person; all but `confirm` return at once."""
+    """What a session asks of a person; all methods but `confirm` return at once."""
 
     def streams(self, shoe: Shoe) -> None:
-        """The shoe is open, and read from here on."""
+        """Called when the shoe is open, before its stream is read."""
 
     def tell(self, sentence: str) -> None:
-        """Say what happens, or what is to be done."""
+        """Show a sentence: what happens, or what is to be done."""
 
     def confirm(self, sentence: str, meanwhile: Callable[[], None]) -> None:
-        """Say what is to be done and come back when it has been done; ``meanwhile`` is to be called all the time."""
+        """Ask for something to be done and return when it is; ``meanwhile`` must be called repeatedly until then."""
 
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
-        """Show readings that are on disk."""
+        """Show readings that are already on disk."""
 
     def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
-        """Whether the experiment is to be pressed again because of ``finding``."""
+        """Whether to press the experiment again because of ``finding``."""
 
 
 class Unattended:
-    """Nobody is there: everything is confirmed, and what can be repeated is repeated."""
+    """An operator without a person: confirms everything, and repeats an experiment as long as that is allowed."""
 
     def streams(self, shoe: Shoe) -> None:
-        """Nobody looks."""
+        """Do nothing."""
 
     def tell(self, sentence: str) -> None:
-        """Nobody hears it."""
+        """Do nothing."""
 
     def confirm(self, sentence: str, meanwhile: Callable[[], None]) -> None:
-        """Taken as done."""
+        """Confirm at once."""
 
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
-        """Nobody looks."""
+        """Do nothing."""
 
     def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
-        """As long as repeats are left."""
+        """True as long as repeats are left."""
         return repeats_left > 0

@@ -1,4 +1,4 @@
-"""`SessionPlan`: what a session is to do, as its folder holds it; and protocols by name or from a file."""
+"""`SessionPlan`: what a session is to do, as stored in its folder; and protocols by name or from a file."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ LARGEST_REPEATS = 100
 
 @dataclass(frozen=True)
 class SessionPlan:
-    """``shoe`` and ``machine`` are URLs, ``unit`` is the one to calibrate, each protocol is one experiment.
+    """What a session is to do: calibrate ``unit`` of ``shoe`` on ``machine`` (URLs), one experiment a protocol.
 
-    The stream is recorded for ``zero_s`` before and ``tail_s`` after each test; from the second pressing on until the
-    unit has come to rest, ``rest_s`` at most. A fault is answered by
-    at most ``largest_repeats`` repeats. ``wait_s`` bounds the wait for a machine that is run by hand, beyond the
-    test's own duration. ``created`` is an ISO date. ``valid_for_days``: how long the stored calibration holds.
+    The stream is recorded for ``zero_s`` before and ``tail_s`` after each test, from the second pressing on also until
+    the unit has come to rest, for at most ``rest_s``. A faulty pressing is repeated at most ``largest_repeats`` times.
+    ``wait_s`` bounds the wait for the log of a machine run by hand, beyond the duration of the test. ``created`` is an
+    ISO date. ``valid_for_days`` is how long the stored calibration is valid.
     """
 
     shoe: str
@@ -69,12 +69,12 @@ class SessionPlan:
         return next(protocol for protocol in self.protocols if protocol.name == name)
 
     def to_dict(self) -> dict[str, Any]:
-        """For ``session.json``."""
+        """The plan as the object in ``session.json``."""
         return {"schema": SCHEMA, **asdict(self)}
 
     @classmethod
     def from_dict(cls, found: Mapping[str, Any], where: str) -> Self:
-        """The plan in an object; raises `InputError` naming ``where`` and the key at fault."""
+        """The plan from an object; raises `InputError` naming ``where`` and the invalid key."""
         schema = found.get("schema") if isinstance(found, Mapping) else None
         if schema != SCHEMA:
             raise InputError(f"{where}: key 'schema' is {schema!r}, not {SCHEMA!r}: give a session's folder")
@@ -87,9 +87,9 @@ class SessionPlan:
 
 
 def protocols_named(names: Sequence[str]) -> tuple[Protocol, ...]:
-    """``static``, ``dynamic``, or the ``[protocol.NAME]`` tables of a TOML file (a scenario, or a next experiment).
+    """Protocols by name: ``static``, ``dynamic``, or a TOML file, of which all ``[protocol.NAME]`` tables are taken.
 
-    Raises `UsageError` where a name is neither, `ScenarioError` with line and key where a table is wrong.
+    Raises `UsageError` for an unknown name, and `ScenarioError` with line and key for an invalid table.
     """
     found: list[Protocol] = []
     for name in names:

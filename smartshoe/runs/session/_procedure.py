@@ -1,4 +1,4 @@
-"""The live part of a session: limits, then each experiment pressed, recorded and looked at until it is good."""
+"""The live part of a session: checks limits, then presses and records each experiment until it has no fault."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ SILENT_S = 30.0
 IDLE_S = 0.05
 REPORT_EVERY_S = 15.0
 REST_OVER_S = 5.0
-AT_REST_SHARE = 1e-4  # of the range, from one stretch to the next
-LOOK_AT_EVERY_S = 2.0  # of the stream, while it runs
+AT_REST_SHARE = 1e-4  # of the range: largest change between successive segments at rest
+LOOK_AT_EVERY_S = 2.0  # interval at which the stream is checked while it runs
 
 
 def conduct(folder: SessionFolder, operator: Operator | None = None) -> None:
-    """Press every experiment of the plan that is not done yet; what was recorded is in ``folder`` at any moment.
+    """Press every experiment of the plan that is not done yet; at any moment ``folder`` holds what was recorded so far.
 
-    Raises `UsageError` and `LimitError` before anything moves, `DeviceError` where a device fails, `InputError` where
-    a log or the disk does, `RefusedError` where an experiment stays faulty after the last repeat. In every case the
-    session can be resumed.
+    Raises `UsageError` and `LimitError` before anything moves, `DeviceError` if a device fails, `InputError` if a log
+    cannot be read or the disk accepts no data, `RefusedError` if an experiment stays faulty after the last repeat. In
+    all cases the session can be resumed.
     """
     operator = operator or Unattended()
     plan = folder.plan
@@ -64,7 +64,7 @@ def conduct(folder: SessionFolder, operator: Operator | None = None) -> None:
 
 
 def _check_limits(machine: MachineSide, protocols: list[Protocol]) -> None:
-    """Every protocol before the first one moves anything."""
+    """Check every protocol before the first one moves anything."""
     for protocol in protocols:
         machine.check(protocol)
     if isinstance(machine, LogByHand) and not machine.is_folder and len(protocols) > 1:
@@ -75,7 +75,7 @@ def _check_limits(machine: MachineSide, protocols: list[Protocol]) -> None:
 
 
 def _check_range(plan: SessionPlan, shoe: Shoe, protocols: list[Protocol], operator: Operator) -> None:
-    """Where an earlier calibration says how far the reading goes, refuse what the sensor's range does not hold."""
+    """Refuse loads at which, by an earlier calibration, the reading would exceed the sensor's range."""
     channel = next(channel for channel in shoe.describe() if channel.name == plan.unit)
     earlier = _earlier(plan)
     if channel.range_ is None or earlier is None or earlier.reading_unit.quantity != channel.unit.quantity:
@@ -96,7 +96,7 @@ def _check_range(plan: SessionPlan, shoe: Shoe, protocols: list[Protocol], opera
 
 
 def _earlier(plan: SessionPlan) -> Calibration | None:
-    """The unit's last calibration in the store."""
+    """The unit's last calibration in the store; None if there is none."""
     if not plan.serial_number:
         return None
     from smartshoe.calibration.store import CalibrationStore
@@ -106,7 +106,7 @@ def _earlier(plan: SessionPlan) -> Calibration | None:
 
 
 class _Stream:
-    """The shoe's blocks, each on disk before anybody sees it; every wait ends."""
+    """The shoe's blocks, each written to disk before anything else uses it; every wait is bounded."""
 
     def __init__(self, shoe: Shoe, folder: SessionFolder, operator: Operator) -> None:
         self._blocks: Iterator[Block] = shoe.blocks()
@@ -119,7 +119,7 @@ class _Stream:
         self.blocks: list[Block] = []
 
     def next(self, experiment: str, elapsed_s: float) -> Block | None:
-        """The next block with samples in it, None where none came (or none will)."""
+        """The next block with samples, None if none came (or none will)."""
         block = next(self._blocks, None)
         self._note_events()
         if block is None:
@@ -136,15 +136,15 @@ class _Stream:
 
     @property
     def last_s(self) -> float:
-        """The last sample's time, 0 before the first."""
+        """Time of the last sample, 0 before the first."""
         return 0.0 if self.time_s is None else self.time_s
 
     def begin(self) -> None:
-        """A pressing begins: what is in memory starts anew."""
+        """Start a pressing: forget the blocks in memory."""
         self.blocks = []
 
     def record(self, experiment: str, duration_s: float) -> None:
-        """``duration_s`` of the stream, or what there is of it within `SILENT_S` of silence."""
+        """Record ``duration_s`` of the stream; stops early after `SILENT_S` without samples."""
         heard, first_s = time.monotonic(), None
         while not self.has_ended and time.monotonic() - heard < SILENT_S:
             block = self.next(experiment, 0.0)
@@ -156,7 +156,7 @@ class _Stream:
                 break
 
     def rest(self, experiment: str, unit: str, longest_s: float) -> None:
-        """Until the unit's unloaded reading stands still: what it remembers of the last pressing is in no model."""
+        """Record until the unit's unloaded reading is steady: no model includes the memory of an earlier pressing."""
         channel = next(channel for channel in self._shoe.describe() if channel.name == unit)
         size = 1.0 if channel.range_ is None else channel.range_[1] - channel.range_[0]
         begin_s, before = self.last_s, np.inf
@@ -173,7 +173,7 @@ class _Stream:
             before = now
 
     def drain(self) -> None:
-        """What a live shoe sends while nothing is pressed; a simulated or replayed one waits."""
+        """Record what a live shoe sends while nothing is pressed; for a simulated or replayed one only wait."""
         if self.is_live and not self.has_ended:
             self.next("", 0.0)
         else:
@@ -190,7 +190,7 @@ class _Stream:
 def _experiment(
     folder: SessionFolder, protocol: Protocol, machine: MachineSide, stream: _Stream, operator: Operator
 ) -> None:
-    """Press until it is good, at most ``largest_repeats`` times more."""
+    """Press until no fault is found, with at most ``largest_repeats`` repeats."""
     plan = folder.plan
     before = sum(attempt.experiment == protocol.name for attempt in folder.attempts())
     for again in count():
@@ -205,7 +205,7 @@ def _experiment(
             folder.note("accepted", findings=[])
             operator.tell(f"{protocol.name}: recorded, no fault found")
             return
-        # A recording with its log cannot be pressed again.
+        # A recording together with its log cannot be pressed again.
         recorded = stream.has_ended or (machine.by_hand and not stream.is_live)
         left = 0 if recorded else plan.largest_repeats - again
         repeat = operator.wants_repeat(fault, left)
@@ -222,7 +222,7 @@ def _experiment(
 def _press(
     folder: SessionFolder, protocol: Protocol, number: int, machine: MachineSide, stream: _Stream, operator: Operator
 ) -> PressingFault | None:
-    """One pressing, recorded; the first fault that is seen."""
+    """Carry out and record one pressing; returns the first fault found, or None."""
     plan = folder.plan
     folder.note("begin", experiment=protocol.name, attempt=number)
     stream.begin()
@@ -247,7 +247,7 @@ def _press(
 
 
 class _Pressing:
-    """The loop's state between a test's start and its end: stream on, log awaited, silence and waiting bounded."""
+    """The state of the loop during one test: the stream is read, the log awaited, and every wait is bounded."""
 
     def __init__(
         self,
@@ -271,7 +271,7 @@ class _Pressing:
         if self._done_s is None:
             self._await_log()
         if self._done_s is not None:
-            # A log that came by hand came long after the test; a machine that ran is followed a little longer.
+            # A log that is delivered by hand comes long after the test; a machine that ran is followed a little longer.
             tail_s = 0.0 if self._machine.by_hand else plan.tail_s
             long_enough = stream.last_s - self._start_s >= self._protocol.duration_s + tail_s
             if stream.has_ended or (long_enough and stream.last_s - self._done_s >= tail_s):
@@ -304,7 +304,7 @@ class _Pressing:
             self._operator.tell(f"waiting for the machine's log: {self._machine.reason}")
 
     def look(self) -> PressingFault | None:
-        """What can be seen, now and then, before a test is over that a person can stop."""
+        """A fault seen in the stream so far, examined at intervals; only for a test that a person can stop."""
         stream = self._stream
         if not (self._machine.by_hand and stream.is_live) or stream.last_s - self._looked_s < LOOK_AT_EVERY_S:
             return None

@@ -1,4 +1,4 @@
-"""A session's result as files: report, result, calibrations, recordings, diagnosis; and its entry in the store."""
+"""Writes a session's result: report, JSON, calibrations, recordings, diagnosis; and stores the calibration."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
-    """Write everything below ``folder`` and, where there is a serial number, into the store.
+    """Write everything below ``folder`` and, with a serial number, add the calibration to the store.
 
-    Returns what to tell of, by what it is.
+    Returns the paths to report, by what they are.
     """
     with writing_to_disk(folder):
         unit, written = _write(result, folder)
@@ -32,7 +32,7 @@ def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
 
 
 def _stored(result: SessionResult) -> Entry | None:
-    """The calibration's entry in the store; None without a serial number, by which the store keeps units."""
+    """Add the calibration to the store and return its entry; None without a serial number."""
     plan = result.plan
     if not plan.serial_number:
         return None
@@ -42,7 +42,7 @@ def _stored(result: SessionResult) -> Entry | None:
 
 
 def _write(result: SessionResult, folder: Path) -> tuple[UnitReport, dict[str, Path]]:
-    """Everything but the page, and what that is to say of the unit."""
+    """Write everything except the page; returns the page's part about the unit, and the paths by what they are."""
     plan = result.plan
     make_folder(folder / "recordings")
     for name, recording in result.recordings.items():
@@ -83,7 +83,7 @@ def _write_page(result: SessionResult, folder: Path, unit: UnitReport, entry: En
 
 
 def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
-    """What a person asks of a session, and the answers: pressed, checked, clocks, stored, valid."""
+    """The rows at the top of the page: what was pressed, checked and stored, the clocks, and the validity."""
     plan = result.plan
     rows = [("unit", f"{plan.unit}, serial number {plan.serial_number or 'not given'}")]
     for name in result.recordings:
@@ -105,7 +105,7 @@ def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
 
 
 def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | None:
-    """The diagnosis in a folder of its own, and its extended calibration beside the plain one."""
+    """Write the diagnosis into a folder of its own, and its extended calibration next to the plain one."""
     from smartshoe.report.diagnosis.folder import publish_diagnosis
 
     found, plan = result.diagnosis, result.plan

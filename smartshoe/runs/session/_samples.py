@@ -1,4 +1,4 @@
-"""A shoe's block as bytes for the journal, and back bit for bit."""
+"""Packs a shoe's block into bytes for the journal and unpacks it, bit for bit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _HAS_HOST, _HAS_ARRIVAL = 1, 2
 
 
 def packed(block: Block) -> bytes:
-    """Counts and flags, then time, readings, what is missing, and the host's times where the block has them."""
+    """The block as bytes: counts and flags, then times, readings, mask of missing samples, host times if present."""
     flags = _HAS_HOST * (block.host_time_s is not None) | _HAS_ARRIVAL * (block.arrival_s is not None)
     parts = [_HEAD.pack(len(block), len(block.names), flags), _bytes(block.time_s), _bytes(block.readings)]
     parts.append(np.ascontiguousarray(block.missing, dtype=np.uint8).tobytes())
@@ -29,7 +29,7 @@ def _bytes(numbers: Array) -> bytes:
 
 
 def unpacked(payload: bytes, names: tuple[str, ...], unit: Unit) -> Block:
-    """The block that `packed` was given; raises `FormatError` where the sizes do not fit."""
+    """The block from which `packed` made ``payload``; raises `FormatError` if the sizes do not fit."""
     try:
         count, units, flags = _HEAD.unpack_from(payload)
     except struct.error as error:

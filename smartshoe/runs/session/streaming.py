@@ -1,4 +1,4 @@
-"""A shoe's stream with nothing lost: every sample in a plain table on disk, forces where there is a calibration."""
+"""Streams a shoe to a plain table on disk without losing samples, with forces for calibrated units."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ LONGEST_BRIDGED_S = 2.0
 
 
 class StreamTable:
-    """A plain table that grows: ``time_s``, a reading of each unit, a force of each calibrated unit.
+    """A growing plain table: ``time_s``, a reading for each unit, a force for each calibrated unit.
 
-    A block is on disk, whole, when `append` returns.
+    A block is completely on disk when `append` returns.
     """
 
     def __init__(self, path: Path | str, block: Block, forces: Sequence[str], metadata: Mapping[str, str]) -> None:
-        """A new file; raises `UsageError` where there is one."""
+        """Create the file; raises `UsageError` if it exists."""
         readings = [f"{name}_{block.unit.suffix}" for name in block.names]
         header = ",".join(["time_s", *readings, *(f"{name}_force_estimate_n" for name in forces)])
         self._forces = tuple(forces)
@@ -32,7 +32,7 @@ class StreamTable:
         self._file.append("".join([f"# {key}: {value}\n" for key, value in metadata.items()] + [header, "\n"]).encode())
 
     def append(self, block: Block, force_n: Mapping[str, Array]) -> None:
-        """A block's samples, shortest exact numbers, empty cells where one is missing."""
+        """Append a block's samples as the shortest exact numbers, with empty cells for missing ones."""
         readings = np.where(block.missing, np.nan, block.readings)
         table = np.column_stack([block.time_s, readings, *(force_n[name] for name in self._forces)])
         rows = (",".join("" if value != value else repr(value) for value in row) for row in table.tolist())
@@ -44,7 +44,7 @@ class StreamTable:
 
 
 class StreamedForces:
-    """The calibrated units' forces of a stream; lost samples are bridged, so that the filters keep their time."""
+    """Forces of the calibrated units in a stream; lost samples are bridged so that the filters keep their time base."""
 
     def __init__(self, calibrations: Sequence[Calibration], shoe: Shoe) -> None:
         names = [channel.name for channel in shoe.describe()]
@@ -65,11 +65,11 @@ class StreamedForces:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The calibrated units."""
+        """Names of the calibrated units."""
         return tuple(self._filters)
 
     def push(self, block: Block) -> dict[str, Array]:
-        """Force (n,) in N of each calibrated unit; raises `UnitError` where a reading is no such unit's."""
+        """Force (n,) in N of each calibrated unit; raises `UnitError` if the readings are of another quantity."""
         steps = np.diff(block.time_s, prepend=self._last_s if self._last_s is not None else block.time_s[:1])
         bridged = np.rint(np.clip(steps, 0.0, LONGEST_BRIDGED_S) * self._rate_hz).astype(int)
         if self._last_s is None:
@@ -91,13 +91,13 @@ class StreamedForces:
         return found
 
 
-WIDTH, TIME_WIDTH, CELL_WIDTH = 80, 10, 17  # characters of a line, its time, one unit
+WIDTH, TIME_WIDTH, CELL_WIDTH = 80, 10, 17  # in characters: of a line, of its time, of one unit
 
 
 class Seconds:
-    """What a stream did since the last report to a person: the least and the most of each unit, in N where calibrated.
+    """The smallest and the largest value of each unit since the last report, in N for calibrated units.
 
-    A walking foot's one value at an instant says nothing; how far it was unloaded and loaded within a second does.
+    A walking foot's value at one instant means little; the range within a second shows how far it was loaded.
     """
 
     def __init__(self, block: Block, forces: Sequence[str]) -> None:
@@ -107,11 +107,11 @@ class Seconds:
 
     @property
     def heading(self) -> str:
-        """The names over the columns, with what stands there."""
+        """The names above the columns, with their units of measurement."""
         return "\n".join(self._rows("time", [f"{name} {symbol}" for name, symbol in self._symbols.items()]))
 
     def add(self, block: Block, force_n: Mapping[str, Array]) -> None:
-        """Take a block in; missing samples are passed over."""
+        """Add a block; missing samples are ignored."""
         for column, name in enumerate(block.names):
             values = np.asarray(force_n.get(name, block.readings[:, column]))[~block.missing[:, column]]
             if values.size:
@@ -119,7 +119,7 @@ class Seconds:
                 self._high[name] = max(self._high.get(name, -np.inf), float(values.max()))
 
     def report(self, time_s: float) -> str:
-        """The line (two where there are many units) at ``time_s``; from then on it counts anew."""
+        """The line at ``time_s`` (several lines for many units); the ranges then start anew."""
         cells = [
             f"{self._low[name]:.1f} to {self._high[name]:.1f}" if name in self._low else "–" for name in self._symbols
         ]

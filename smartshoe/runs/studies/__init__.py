@@ -1,4 +1,4 @@
-"""Studies: many trials by subject and condition, compared within subjects."""
+"""Studies: trials of many subjects under several conditions, compared within subjects."""
 
 from smartshoe.runs.studies._running import StudyResult, study
 

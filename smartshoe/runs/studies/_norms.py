@@ -1,4 +1,4 @@
-"""Norms that a laboratory brings: ranges of figures with their source, and which subjects lie outside them."""
+"""Norms given by a laboratory: ranges of figures with their source, and which subjects lie outside them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLUMNS = ("figure", "low", "high", "source")
 
 @dataclass(frozen=True, slots=True)
 class Norm:
-    """``figure`` lies from ``low`` to ``high``, as ``source`` says; of one ``condition``, of all where it is empty."""
+    """A norm: ``figure`` lies from ``low`` to ``high`` according to ``source``, under one ``condition`` or any ('')."""
 
     figure: str
     low: float
@@ -27,7 +27,7 @@ class Norm:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """A norm beside the means of the ``subjects`` who did ``condition``: which of them lie ``outside``."""
+    """A norm and the number of ``subjects`` compared with it under ``condition``; ``outside`` names those beyond it."""
 
     norm: Norm
     condition: str
@@ -35,15 +35,15 @@ class Compared:
     outside: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The comparison as an object for JSON."""
         outside = {"subjects": self.subjects, "within": self.subjects - len(self.outside), "outside": [*self.outside]}
         return {**asdict(self.norm), "condition": self.condition, **outside}
 
 
 def read_norms(path: Path, conditions: Sequence[str]) -> list[Norm]:
-    """The norms of a CSV file with columns figure, low, high, source and, where wanted, condition.
+    """The norms in a CSV file with columns figure, low, high, source and, optionally, condition.
 
-    Raises `InputError` that names the line; a condition that is none of ``conditions`` is misspelt.
+    Raises `InputError`, naming the line, for an invalid row, and for a condition that is none of ``conditions``.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -77,7 +77,10 @@ def _norm(row: Mapping[str, str | None], where: str) -> Norm:
 
 
 def compared(norms: Sequence[Norm], means: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Compared]:
-    """Each norm beside the subjects' means, by condition, figure and subject; no subjects where none has it."""
+    """Compare each norm with the subjects' means, given by condition, figure and subject.
+
+    A norm whose figure no trial has is listed once, with 0 subjects.
+    """
     found: list[Compared] = []
     for norm in norms:
         of = [norm.condition] if norm.condition else list(means)

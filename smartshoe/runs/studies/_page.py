@@ -1,4 +1,4 @@
-"""The page of a study: what differs between conditions, the figures by condition and by trial, what was left out."""
+"""The page of a study: differences between conditions, figures by condition and by trial, and trials left out."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ SHOWN = {
     "peak_body_weight_percent": "peak force (% of body weight)",
     "impulse_body_weight_percent_s": "impulse (% of body weight × s)",
     "loading_rate_n_per_s": "loading rate (N/s)",
-}  # what a person reads, by the name in the files
-NAMED = 3  # of the trials that a sentence is said of
+}  # labels on the page, by the figures' names in the files
+NAMED = 3  # number of trials that a sentence names
 AGREED = {
     "stance_time_s": ("stance time", "s"),
     "stance_percent": ("stance", "% of stride"),
@@ -41,7 +41,7 @@ AGREED = {
 
 
 def write_page(path: Path, result: StudyResult, source: Path) -> None:
-    """Write the page to ``path``, whole or not at all."""
+    """Write the page to ``path``, completely or not at all."""
     figures = shown_figures(result)
     subjects = {trial.entry.subject for trial in result.trials}
     write_document(
@@ -77,12 +77,12 @@ def write_page(path: Path, result: StudyResult, source: Path) -> None:
 
 
 def shown_figures(result: StudyResult) -> list[str]:
-    """The figures of `SHOWN` that some trial has: the rest is in the files."""
+    """The figures of `SHOWN` that at least one trial has; all others are only in the files."""
     return [name for name in SHOWN if any(name in trial.figures for trial in result.trials)]
 
 
 def careful(result: StudyResult) -> list[tuple[str, str]]:
-    """What to be careful with, each sentence once, with the trials that it is said of."""
+    """The flags of the trials, each sentence once, with the trials that it concerns."""
     by_flag: dict[str, list[str]] = {}
     for trial in result.trials:
         for flag in trial.flags:
@@ -93,14 +93,14 @@ def careful(result: StudyResult) -> list[tuple[str, str]]:
 
 
 def _some(files: list[str], of: int) -> str:
-    """A few files by name, the rest by number."""
+    """A few files by name, and the number of the others."""
     if len(files) == of > 1:
         return f"all {of} trials"
     return ", ".join(files[:NAMED]) + (f" and {len(files) - NAMED} more" if len(files) > NAMED else "")
 
 
 def headline(result: StudyResult) -> str:
-    """One sentence: what changes clearly between conditions."""
+    """One sentence that says which figures clearly differ between conditions."""
     clear = [each for each in result.differences if each.figure in SHOWN and is_clear(each.change)]
     if len(result.conditions) < 2:
         return "one condition only: there is nothing to compare, and its figures stand below"
@@ -116,7 +116,7 @@ def headline(result: StudyResult) -> str:
 
 
 def is_clear(mean: Mean) -> bool:
-    """Whether the interval leaves out zero."""
+    """Whether the interval excludes zero."""
     return mean.ci95 is not None and (mean.ci95[0] > 0.0 or mean.ci95[1] < 0.0)
 
 

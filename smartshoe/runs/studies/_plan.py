@@ -1,4 +1,4 @@
-"""What a study's file may say, checked with errors that name the file, the line and the key."""
+"""The keys of a study's file, with errors that name the file, the line and the key."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from smartshoe.runs.scenario import ScenarioText, read_tables
 class TrialEntry(BaseModel):
     """``[[trial]]``: a recording of a subject under a condition.
 
-    ``reference`` is a file of the same trial's forces by something better (pressure plates, an instrumented
-    treadmill); ``date`` finds the calibrations of that day where they come from a store.
+    ``reference`` is a file with the forces of the same trial from a reference instrument (pressure plates, an
+    instrumented treadmill); ``date`` selects the calibrations of that day if they come from a store.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -29,7 +29,7 @@ class TrialEntry(BaseModel):
 
 
 class StudyPlan(BaseModel):
-    """A study's file. Paths are relative to its folder; ``norms`` is a table of ranges with their source."""
+    """A study's file. Paths are relative to its folder; ``norms`` is a table of ranges with their sources."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     title: str = "Study"
@@ -45,7 +45,7 @@ class StudyPlan(BaseModel):
 
 
 def read_study(path: Path | str) -> tuple[StudyPlan, ScenarioText]:
-    """Read and check a study's file; raises `ScenarioError`: what is wrong, with line and key."""
+    """Read and check a study's file; raises `ScenarioError`, which says what is wrong, with line and key."""
     tables, source = read_tables(path)
     try:
         plan = StudyPlan.model_validate(tables)

@@ -1,4 +1,4 @@
-"""The verb: every trial of a study analysed, and what conditions change within subjects."""
+"""`study`: analyses every trial of a study and compares the conditions within subjects."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ SCHEMA = "smartshoe.study/1"
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """The mean force of a foot over a stride (101,) in percent of body weight, and what 95 % of subjects do.
+    """The mean force of a foot over a stride (101,) in percent of body weight, with a prediction interval.
 
-    ``low`` and ``high`` are where a further subject's mean lies with 95 %; None with fewer than three subjects.
+    ``low`` and ``high`` (101,) enclose a further subject's mean with 95 % probability; None with fewer than three
+    subjects.
     """
 
     mean: Array
@@ -50,12 +51,12 @@ class Band:
 
     @property
     def source(self) -> str:
-        """Whom the band is taken from, and how."""
+        """The subjects that the band is based on, and how it was computed, as text."""
         whom = f"this study's {self.subjects} subject{'' if self.subjects == 1 else 's'}"
         return f"{whom}: mean" if self.low is None else f"{whom}: mean and 95 % prediction interval"
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The band as an object for JSON."""
         return {
             "unit": "percent of body weight",
             "percent_of_stride": list(range(self.mean.size)),
@@ -77,17 +78,17 @@ class Difference:
     change: Mean
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The difference as an object for JSON."""
         return {"from": self.start, "to": self.end, "figure": self.figure, **self.change.to_dict()}
 
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """A study: the ``trials`` that were used, and those ``left_out``; means by condition and figure, ``differences``.
+    """The result of a study: ``trials`` used and ``left_out``, means by condition and figure, and ``differences``.
 
-    ``agreement`` with the trials' references is by figure. ``bands`` maps a condition to the usual course of a
-    stride; ``norms`` are those that the study brought, with who lies outside; ``flags`` says what concerns a study and
-    not a trial alone: of which trials to be careful.
+    ``agreement`` with the trials' references is by figure. ``bands`` maps a condition to the usual force over a stride.
+    ``norms`` are the norms of the study, with the subjects outside them. ``flags`` are warnings that need the whole
+    study, as pairs of file and sentence.
     """
 
     plan: StudyPlan
@@ -102,7 +103,7 @@ class StudyResult:
     report: Path | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.study/1; no NaN, no infinity."""
+        """The result in schema smartshoe.study/1, without NaN or infinity."""
         return {
             "schema": SCHEMA,
             "title": self.plan.title,
@@ -131,7 +132,7 @@ class StudyResult:
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a trial: file, subject, condition, activity, and its figures."""
+        """A DataFrame with one row for each trial: file, subject, condition, activity, and its figures."""
         import pandas as pd
 
         return pd.DataFrame(
@@ -161,13 +162,13 @@ def study(
     Parameters
     ----------
     path
-        The study's file: ``title``, ``calibrations``, and a ``[[trial]]`` each with file, subject and condition.
+        The study's file: ``title``, ``calibrations``, and for each trial a ``[[trial]]`` with file, subject, condition.
     out
-        Where ``study.html``, ``study.json``, ``trials.csv`` and ``differences.csv`` go; None writes nothing.
+        Folder for ``study.html``, ``study.json``, ``trials.csv`` and ``differences.csv``; None writes nothing.
     jobs
-        Processes on this machine; None: one a core. Each holds one trial at a time.
+        Number of processes on this machine; None means one for each core. Each holds one trial at a time.
     c3d
-        Write each trial as C3D with its events too, below ``out/c3d`` (needs the extra ``c3d``).
+        Also write each trial with its events as C3D, below ``out/c3d`` (needs the extra ``c3d``).
     progress
         Called with the number of trials done and to do.
 
@@ -176,9 +177,9 @@ def study(
     ScenarioError
         The study's file is wrong.
     InputError
-        A table of norms that cannot be read, or names a condition that no trial has.
+        A table of norms cannot be read, or names a condition that no trial has.
     RefusedError
-        No trial could be used; one that cannot is left out and stops nothing.
+        No trial could be used. If only some cannot, they are left out.
     """
     plan, source = read_study(path)
     if c3d and out is None:
@@ -200,7 +201,7 @@ def study(
 def _analysed(
     plan: StudyPlan, base: Path, c3d_folder: Path | None, jobs: int | None, progress: Progress | None
 ) -> list[TrialFigures]:
-    """Each trial's figures, in the plan's order, from as many processes as are worth it."""
+    """Each trial's figures, in the plan's order, computed in several processes."""
     from joblib import Parallel, cpu_count, delayed
 
     wanted = min(int(cpu_count()) if jobs is None else jobs, len(plan.trial))
@@ -280,7 +281,7 @@ def _differences(plan: StudyPlan, means: Mapping[str, Mapping[str, Mapping[str, 
 
 
 def _bands(plan: StudyPlan, trials: Sequence[TrialFigures]) -> dict[str, Band]:
-    """The usual course of a stride under each condition: mean over subjects, and where a further one would lie."""
+    """The usual force over a stride under each condition: mean over subjects, and prediction interval."""
     found: dict[str, Band] = {}
     for condition in plan.conditions:
         curves: dict[str, list[Array]] = {}
@@ -308,7 +309,7 @@ def _written(result: StudyResult, folder: Path, source: Path) -> StudyResult:
 
 
 def differences_text(result: StudyResult) -> str:
-    """The differences as CSV text: one row a pair of conditions and figure."""
+    """The differences as CSV text, with one row for each pair of conditions and figure."""
     import pandas as pd
 
     columns = ["from", "to", "figure", "mean", "sd", "ci95_low", "ci95_high", "subjects", "interval"]

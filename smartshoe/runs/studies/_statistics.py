@@ -1,4 +1,4 @@
-"""Means with intervals, differences within subjects, agreement with a reference."""
+"""Statistics of a study: means with intervals, differences within subjects, and agreement with a reference."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from smartshoe.arrays import Array
 from smartshoe.signals.noise import NORMAL_95
 
 CONFIDENCE = 0.95
-BOOTSTRAP_FROM = 10  # subjects: with fewer, resampling them cannot show their spread, and Student's t is used
-PREDICTED_FROM = 3  # subjects: from two, an interval for a third is wider than anything that one does
+BOOTSTRAP_FROM = 10  # number of subjects; fewer cannot show their spread by resampling, and Student's t is used
+PREDICTED_FROM = 3  # number of subjects; from two, an interval for a third would be wider than any real difference
 RESAMPLES = 5000
-SEED = 20160920  # of the resampling, so that a study gives the same numbers twice
+SEED = 20160920  # of the resampling, so that a study always gives the same numbers
 
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """A mean over subjects with standard deviation and 95 % interval; None where one subject cannot tell."""
+    """A mean over subjects with standard deviation and 95 % interval, both None for a single subject."""
 
     mean: float
     sd: float | None
@@ -29,7 +29,7 @@ class Mean:
     method: str
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The mean as an object for JSON."""
         return {
             "mean": self.mean,
             "sd": self.sd,
@@ -40,15 +40,15 @@ class Mean:
 
 
 def mean_of(values: Array) -> Mean:
-    """The mean of one value a subject (n,), with Student's t interval."""
+    """The mean over subjects (n,), with Student's t interval."""
     sd = float(values.std(ddof=1)) if values.size > 1 else None
     return Mean(float(values.mean()), sd, _t_interval(values), values.size, "t")
 
 
 def difference_of(differences: Array) -> Mean:
-    """The mean of one difference a subject (n,).
+    """The mean of the differences of subjects (n,).
 
-    Its interval is the paired t interval, and from `BOOTSTRAP_FROM` subjects on the bias-corrected and accelerated
+    Its interval is the paired t interval or, from `BOOTSTRAP_FROM` subjects on, the bias-corrected and accelerated
     bootstrap over subjects (Efron 1987).
     """
     plain = mean_of(differences)
@@ -73,9 +73,9 @@ def _t_interval(values: Array) -> tuple[float, float] | None:
 
 
 def prediction_interval(values: Array) -> tuple[Array, Array] | None:
-    """Where one more subject's values lie with 95 %, from those of n subjects (n, m), if they spread normally.
+    """The interval (m,) that contains a further subject's values with 95 %, from those of n subjects (n, m).
 
-    None with fewer than `PREDICTED_FROM` subjects.
+    Assumes that subjects are normally distributed. None with fewer than `PREDICTED_FROM` subjects.
     """
     from scipy.stats import t
 
@@ -88,11 +88,11 @@ def prediction_interval(values: Array) -> tuple[Array, Array] | None:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Ours less the reference: bias and limits of agreement with intervals, and the intraclass correlation.
+    """Our values minus the reference's: bias and limits of agreement with intervals, and the intraclass correlation.
 
-    ``sd`` of a single stride's difference, within and between trials together (Bland and Altman 2007, section 3:
-    the true value varies); ``icc`` is ICC(A,1), absolute agreement of single measurements, of trial means
-    (McGraw and Wong 1996), None with fewer than three trials.
+    ``sd`` is that of a single stride's difference, within and between trials together (Bland and Altman 2007, section
+    3: the true value varies). ``icc`` is ICC(A,1), the absolute agreement of single measurements, computed from trial
+    means (McGraw and Wong 1996); None with fewer than three trials.
     """
 
     bias: float
@@ -106,7 +106,7 @@ class Agreement:
     trials: int
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The agreement as an object for JSON."""
         return {
             "bias": self.bias,
             "bias_ci95": None if self.bias_ci95 is None else list(self.bias_ci95),
@@ -120,7 +120,7 @@ class Agreement:
 
 
 def agreement_of(pairs: Sequence[Array]) -> Agreement:
-    """How pairs (strides, 2) of each trial agree: the first column is ours, the second the reference's."""
+    """The agreement of pairs (strides, 2) of each trial: our value and the value of the reference."""
     differences = [own[:, 0] - own[:, 1] for own in pairs]
     means = np.array([own.mean() for own in differences])
     counts = np.array([own.size for own in differences], dtype=float)
@@ -129,14 +129,14 @@ def agreement_of(pairs: Sequence[Array]) -> Agreement:
     inside = sum(float(((own - own.mean()) ** 2).sum()) for own in differences)
     freedom = every.size - means.size
     within = inside / freedom if freedom > 0 else 0.0
-    # Of the variance of trial means, what their strides' own spread does not explain.
+    # The part of the variance of trial means that the spread of their strides does not explain.
     between = max(float(means.var(ddof=1)) - within * float(np.mean(1.0 / counts)), 0.0) if means.size > 1 else 0.0
     sd = float(np.sqrt(within + between))
     half = None
     if means.size > 1:
         from scipy.stats import t
 
-        # Bland and Altman 1999: the standard error of a limit is about sqrt(3/n) sd, n independent units: trials.
+        # Bland and Altman 1999: the standard error of a limit is about sqrt(3/n) sd; here n counts trials.
         half = float(t.ppf(0.5 + CONFIDENCE / 2, means.size - 1) * np.sqrt(3.0 / means.size) * sd)
     icc = _icc(np.array([own.mean(axis=0) for own in pairs])) if means.size > 2 else None
     return Agreement(
@@ -146,7 +146,7 @@ def agreement_of(pairs: Sequence[Array]) -> Agreement:
 
 
 def _icc(table: Array) -> tuple[float, tuple[float, float]] | None:
-    """ICC(A,1) of (n, k) and its 95 % interval; None where nothing varies. McGraw and Wong 1996, tables 4 and 7."""
+    """ICC(A,1) of a table (n, k) and its 95 % interval; None if nothing varies. McGraw and Wong 1996, tables 4, 7."""
     from scipy.stats import f
 
     n, k = table.shape
@@ -175,5 +175,5 @@ def _icc(table: Array) -> tuple[float, tuple[float, float]] | None:
 
 
 def by_subject(values: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """One mean a subject, so that a subject with more trials counts no more."""
+    """The mean of each subject's values, so that a subject with more trials does not weigh more."""
     return {subject: float(np.mean(own)) for subject, own in values.items() if len(own)}

@@ -1,4 +1,4 @@
-"""Trials in which left and right look swapped: their asymmetries mirror those of the subject's other trials."""
+"""Finds trials in which left and right seem swapped: their asymmetries mirror those of the subject's other trials."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from smartshoe.runs.studies._trials import TrialFigures
 
-FEWEST = 3  # trials of a subject
-NOTABLE_PERCENT = 3.0  # root mean square of a subject's asymmetries: below, left and right are too alike to tell
-CLEARLY = 3.0  # times nearer to the mirror than to the others, and further from the others than they scatter
+FEWEST = 3  # trials that a subject must have
+NOTABLE_PERCENT = 3.0  # rms of a subject's asymmetries; below it left and right are too alike to be told apart
+CLEARLY = 3.0  # how many times nearer to the mirror image than to the other trials, and than those scatter
 
 
 def swapped_trials(trials: Sequence[TrialFigures]) -> list[TrialFigures]:
-    """The trials whose left and right look swapped."""
+    """The trials in which left and right seem swapped."""
     found: list[TrialFigures] = []
     for subject in dict.fromkeys(trial.entry.subject for trial in trials):
         own = [trial for trial in trials if trial.entry.subject == subject]

@@ -1,4 +1,4 @@
-"""One trial of a study: read, analysed, and brought down to what the study keeps of it."""
+"""Reads and analyses one trial of a study, and reduces it to the figures that the study keeps."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ if TYPE_CHECKING:
     from smartshoe.recording import Recording
 
 
-COMPARED = ("stance_time_s", "stance_percent", "peak_n", "impulse_n_s")  # stride by stride with a reference
-SAME_STRIDE_S = 0.15  # between two heel strikes: further apart, they are not the same
-COUNTS = ("strides", "order_of_contact", "order_of_contact_percent")  # of a summary: no figures of a person's gait
+COMPARED = ("stance_time_s", "stance_percent", "peak_n", "impulse_n_s")  # compared with a reference, stride by stride
+SAME_STRIDE_S = 0.15  # heel strikes further apart than this belong to different strides
+COUNTS = ("strides", "order_of_contact", "order_of_contact_percent")  # not figures of the gait itself
 
 
 @dataclass(frozen=True, eq=False)
 class TrialFigures:
-    """What a study keeps of a trial: no signal, so that memory holds one trial at a time.
+    """What a study keeps of a trial; without signals, so that memory holds only one trial at a time.
 
-    ``curve`` (101,) is the mean force of both feet over a stride in percent of body weight, None where forces or body
-    weight are not known. ``pairs`` maps a figure to (strides, 2): ours, the reference's.
+    ``curve`` (101,) is the mean force of a foot over a stride in percent of body weight, None if forces or body weight
+    are unknown. ``pairs`` maps a figure to (strides, 2): our value and the reference's. ``left_out`` is the reason if
+    the trial could not be used.
     """
 
     entry: TrialEntry
@@ -46,7 +47,7 @@ class TrialFigures:
 
 @on_one_thread
 def figures_of_trial(entry: TrialEntry, folder: str, calibrations: str | None, c3d: str | None) -> TrialFigures:
-    """Read and analyse one trial; what cannot be is left out with its sentence. ``c3d``: where to write one."""
+    """Read and analyse one trial; if that fails, ``left_out`` says why. ``c3d`` is the path of a C3D file to write."""
     from smartshoe.files.logs import read
     from smartshoe.gait import analyse
 
@@ -75,7 +76,7 @@ def figures_of_trial(entry: TrialEntry, folder: str, calibrations: str | None, c
             pairs,
         )
     except SmartShoeError as error:
-        # Files named from the study's folder, so that the study is the same on any machine.
+        # Name files relative to the study's folder, so that the result is the same on any machine.
         said = str(error).replace(f"{base}{os.sep}", "")
         return TrialFigures(entry, left_out=" ".join(said.split()))
 
@@ -91,7 +92,7 @@ def _nothing_in_common(entry: TrialEntry) -> dict[str, Any]:
 
 
 def calibrations_for(recording: Recording, place: Path | None, entry: TrialEntry) -> list[Calibration]:
-    """The calibrations of a trial's units, from a folder of files or a store; none where ``place`` is None."""
+    """The calibrations of a trial's units, from a folder of files or a store; none if ``place`` is None."""
     if place is None:
         return []
     from smartshoe.calibration import Calibration
@@ -114,9 +115,9 @@ def calibrations_for(recording: Recording, place: Path | None, entry: TrialEntry
 
 
 def flat_figures(found: GaitResult) -> dict[str, float]:
-    """The summary's figures by name: what is known of each foot as the mean of both, and by foot (``NAME.left``).
+    """The summary's figures by name: of each foot (``NAME.left``, ``NAME.right``), and as the mean of both (``NAME``).
 
-    Forces also in percent of body weight, so that subjects compare.
+    Forces are added in percent of body weight, so that subjects can be compared.
     """
     figures: dict[str, float] = {}
     for name, value in found.summary.items():
@@ -157,7 +158,7 @@ def _flat(name: str, value: Any) -> dict[str, float]:
 
 
 def mean_curve(found: GaitResult) -> Array | None:
-    """The mean force of a foot over its strides (101,), both feet's mean, in percent of body weight."""
+    """The mean force of a foot over its strides (101,), averaged over both feet, in percent of body weight."""
     from smartshoe.gait.indices import overlaid
     from smartshoe.gait.summary import of_main_activity
 
@@ -174,7 +175,7 @@ def mean_curve(found: GaitResult) -> Array | None:
 
 
 def pairs_of(ours: GaitResult, theirs: GaitResult) -> dict[str, Array]:
-    """Each figure of `COMPARED` for strides that both have (m, 2): ours, the reference's."""
+    """For each figure of `COMPARED` the pairs (m, 2) of strides found by both: our value and the reference's."""
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in COMPARED}
     for stride in ours.strides:
         same = [other for other in theirs.strides if other.foot == stride.foot]

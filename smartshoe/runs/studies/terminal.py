@@ -1,4 +1,4 @@
-"""A study's outcome on a terminal."""
+"""Prints a study's result on a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from smartshoe.runs.studies._running import StudyResult
 
 
 def print_study(result: StudyResult) -> None:
-    """Figures by condition, clear differences, what was left out, where the page lies."""
+    """Print figures by condition, clear differences, trials left out, and the path of the page."""
     console = new_console()
     table = table_of("mean over subjects ± sd", ["figure", *result.conditions])
     for name in shown_figures(result):

@@ -1,4 +1,4 @@
-"""One case: its scenario run, and its figures by name. The same bytes wherever it is computed."""
+"""One case of a sweep: runs its scenario and collects its figures; the bytes are the same wherever it is computed."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ JUDGED = (
 
 
 def computed(case: Case) -> str:
-    """The case's JSON text: its figures, or the sentence that says why it has none.
+    """The case's JSON text: its figures, or the reason for which it has none.
 
-    What a case cannot do is part of its result; a want of memory or a failing disk is not, and raises `DeviceError`.
+    A case that fails is a valid result. Lack of memory or a failing disk is not, and raises `DeviceError`.
     """
     outcome: dict[str, Any]
     try:
@@ -48,7 +48,7 @@ def computed(case: Case) -> str:
             f"case {case.name} could not be computed here ({type(error).__name__}: {error}): mend that, and the same"
             " command goes on"
         ) from error
-    except Exception as error:  # one case's fault must not cost the others: it is reported with its name
+    except Exception as error:  # a bug in one case must not stop the others; it is reported in the case
         ours = f"{type(error).__name__}: {error} (a fault of smartshoe's: please report it)"
         said = _sentence(failure_of_others(error) or ours, case)
         outcome = {"status": "failed", "says": said, "figures": {}}
@@ -64,7 +64,7 @@ def computed(case: Case) -> str:
     )
 
 
-# Sums over several threads come out in another order, and so in other last digits.
+# With several threads sums are formed in another order and differ in the last digits.
 @on_one_thread
 def _run(case: Case) -> ScenarioResult:
     source = ScenarioText(Path(case.source), case.text)
@@ -72,7 +72,7 @@ def _run(case: Case) -> ScenarioResult:
 
 
 def _sentence(said: str, case: Case) -> str:
-    """What went wrong, with files named from the scenario's folder, so that it is the same on any machine."""
+    """The error as one line, with files named relative to the scenario's folder, so that all machines give the same."""
     return " ".join(said.replace(f"{Path(case.source).parent}{os.sep}", "").split())
 
 
@@ -111,7 +111,7 @@ def _finite(value: float | None) -> float | None:
 
 
 def _flat(given: Mapping[str, Any], before: str) -> Figures:
-    """Numbers and words of nested tables, by dotted name; lists of words as one text."""
+    """Numbers and words of nested tables, by dotted name; a list of words becomes one text."""
     found: Figures = {}
     for name, value in given.items():
         if isinstance(value, Mapping):

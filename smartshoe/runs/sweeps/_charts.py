@@ -13,14 +13,14 @@ from smartshoe.report.numbers import plain
 if TYPE_CHECKING:
     import pandas as pd
 
-CLASSES = 8  # of a key that takes more values than that, as many cases in each
-LINES = 5  # of one chart over a pair of keys
+CLASSES = 8  # number of equally large classes into which a key with more values is divided
+LINES = 5  # largest number of lines in a chart over a pair of keys
 LINE_COLOURS = ("load", "reading", "raw", "corrected", "toe")
 MOST_PAIRS = 6
 
 
 def against_key(table: pd.DataFrame, key: str, figure: str) -> Chart:
-    """``figure`` against a key over all other keys: median with quartiles, the least and the most."""
+    """``figure`` against one key, over all other keys: median, quartiles, minimum and maximum."""
     there = table[[key, figure]].dropna()
     which, x, words = _classes(there[key], CLASSES)
     groups = [there[figure].to_numpy()[which == each] for each in range(x.size)]
@@ -36,9 +36,9 @@ def against_key(table: pd.DataFrame, key: str, figure: str) -> Chart:
 
 
 def over_pairs(table: pd.DataFrame, keys: list[str], figure: str) -> list[Chart]:
-    """The median of ``figure`` against one key, a line for each value of another; lines that are not parallel interact.
+    """The median of ``figure`` against one key, with a line for each value of another; non-parallel lines interact.
 
-    The first pairs of ``keys`` where there are many.
+    Only the first `MOST_PAIRS` pairs of ``keys`` are drawn.
     """
     return [_over_pair(table, across, other, figure) for across, other in list(combinations(keys, 2))[:MOST_PAIRS]]
 
@@ -60,9 +60,10 @@ def _over_pair(table: pd.DataFrame, across: str, other: str, figure: str) -> Cha
 
 
 def _classes(values: pd.Series[Any], most: int) -> tuple[Any, Any, str]:
-    """The class of each value, where each class stands on an axis (ascending), and a sentence for words.
+    """The class of each value, the position (ascending) of each class on an axis, and a sentence that explains words.
 
-    Each value is a class, or the values are cut into ``most`` classes of as many cases each, standing at their medians.
+    Each value is a class, or the values are divided into ``most`` classes of equally many cases, placed at their
+    medians.
     """
     import pandas as pd
 

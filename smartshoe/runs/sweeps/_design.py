@@ -1,4 +1,4 @@
-"""The design of a sweep: which values of which keys, and which seeds, each case has."""
+"""The design of a sweep: the values of the varied keys, and the seed, of each case."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SPREADS = "a list, {from = A, to = B, count = N}, {uniform = [A, B]} or {log_uni
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """What one key takes: the ``values`` listed, or a range (``low``, ``high``) to draw from, evenly or in log."""
+    """The values of one key: ``values`` if they are listed, otherwise a range (``low``, ``high``), linear or log."""
 
     key: str
     values: tuple[Any, ...] = ()
@@ -32,7 +32,7 @@ class Axis:
 
     @property
     def is_range(self) -> bool:
-        """True where values are drawn from a range."""
+        """Whether values are drawn from a range."""
         return not self.values
 
     def at(self, share: float) -> Any:
@@ -44,15 +44,15 @@ class Axis:
         return float(self.low + share * (self.high - self.low))
 
     def ends(self) -> tuple[Any, ...]:
-        """The values by which the axis is checked before anything runs: all that are listed, or both ends."""
+        """The values with which the axis is checked before anything runs: all listed ones, or the range's ends."""
         return self.values or (self.low, self.high)
 
 
 @dataclass(frozen=True)
 class SweepDesign:
-    """All cases in order: the axes' grid (the last axis fastest) or random draws, each with every seed.
+    """All cases in order: the grid of the axes (the last axis varies fastest) or random draws, each with every seed.
 
-    A random design's first cases stay the same where its count grows.
+    The first cases of a random design do not change when its count grows.
     """
 
     axes: tuple[Axis, ...]
@@ -80,7 +80,7 @@ class SweepDesign:
         return {axis.key: found[axis.key] for axis in self.axes}
 
     def seed(self, case: int) -> int:
-        """The seed of a case."""
+        """The seed of a case (0-based)."""
         return self.seeds[case % len(self.seeds)]
 
 
@@ -148,7 +148,7 @@ def _seeds(given: Any, refuse: Refuse) -> tuple[int, ...]:
 
 
 def _flat(given: Any, refuse: Refuse, before: tuple[str, ...] = ()) -> list[tuple[str, Any]]:
-    """Keys with what they take; a key may be one quoted text or dotted tables, as TOML reads it without quotes."""
+    """The varied keys and their settings; a key may be a quoted text or, unquoted, dotted tables as TOML reads it."""
     if not isinstance(given, dict):
         raise refuse(("sweep", "vary", *before), f"give keys of the scenario with {SPREADS}")
     found: list[tuple[str, Any]] = []
@@ -184,7 +184,7 @@ def _number(given: Any) -> bool:
 
 
 def _spaced(given: Mapping[str, Any], path: Path, refuse: Refuse) -> tuple[Any, ...]:
-    """``count`` values from ``from`` to ``to``, evenly; whole numbers stay whole where the step is."""
+    """``count`` evenly spaced values from ``from`` to ``to``; integers if both ends and the step are integers."""
     first, last = given["from"], given["to"]
     count = _counted(given["count"], path, refuse)
     if not (_number(first) and _number(last)):

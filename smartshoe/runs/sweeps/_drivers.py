@@ -1,4 +1,4 @@
-"""Which varied key drives which figure: rank correlations over the cases of a sweep."""
+"""Finds which varied key drives which figure, by rank correlations over the cases of a sweep."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MAIN = ("rmse_compensated_n", "trial.rmse_total_n.corrected", "explained_percent")
-CLEAR = 0.01  # p value below which a dependence is called one
+CLEAR = 0.01  # p value below which a dependence is reported
 LOW_IS_BAD = ("explained_percent", "fit_percent", "improvement_percent", "improvement_over_static_percent")
 
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """How a figure goes with a key.
+    """How a figure depends on a key.
 
-    ``strength`` is Spearman's rank correlation in [-1, 1] where the key is a number (``is_signed``), else the
-    correlation ratio of the figure's ranks over the key's values, in [0, 1]; ``p_value`` is that of no dependence
-    (of Spearman's test, of Kruskal and Wallis'), other keys left to chance.
+    ``strength`` is Spearman's rank correlation in [-1, 1] if the key is a number (``is_signed``), otherwise the
+    correlation ratio of the figure's ranks over the key's values, in [0, 1]. ``p_value`` is that of no dependence
+    (Spearman's test, or that of Kruskal and Wallis), with the other keys treated as chance.
     """
 
     key: str
@@ -34,7 +34,7 @@ class Driver:
 
 
 def figures_in(table: pd.DataFrame, plan: SweepPlan) -> list[str]:
-    """The columns that hold figures that are numbers and not the same for all cases."""
+    """The columns that hold numeric figures which differ between cases."""
     own = {axis.key for axis in plan.design.axes} | {"seed", "status", "says", "case"}
     import pandas as pd
 
@@ -43,13 +43,13 @@ def figures_in(table: pd.DataFrame, plan: SweepPlan) -> list[str]:
 
 
 def main_figures(table: pd.DataFrame, plan: SweepPlan) -> list[str]:
-    """The figures that the page begins with: each unit's error after compensation, and the trial's."""
+    """The figures at the top of the page: each unit's error after compensation, and the trial's."""
     there = figures_in(table, plan)
     return [name for name in there if name.endswith(MAIN)] or there[:1]
 
 
 def drivers_of(table: pd.DataFrame, plan: SweepPlan, figures: list[str]) -> list[Driver]:
-    """One for each figure and key that take more than one value, the strongest first."""
+    """A `Driver` for each figure and key that take more than one value, the strongest first."""
     found: list[Driver] = []
     for figure in figures:
         for axis in plan.design.axes:
@@ -61,7 +61,7 @@ def drivers_of(table: pd.DataFrame, plan: SweepPlan, figures: list[str]) -> list
 
 def _driver(there: pd.DataFrame, key: str, figure: str) -> Driver:
     import pandas as pd
-    from scipy.special import chdtrc, stdtr  # scipy.stats has both tests, and takes a second and 50 MB to come
+    from scipy.special import chdtrc, stdtr  # scipy.stats has both tests, but takes a second and 50 MB to import
 
     ranks, count = there[figure].rank(), len(there)
     if pd.api.types.is_numeric_dtype(there[key]) and not pd.api.types.is_bool_dtype(there[key]):
@@ -72,12 +72,12 @@ def _driver(there: pd.DataFrame, key: str, figure: str) -> Driver:
     groups = [own.to_numpy() for _, own in ranks.groupby(there[key])]
     between = sum(own.size * (own.mean() - ranks.mean()) ** 2 for own in groups)
     share = float(between / ((ranks - ranks.mean()) ** 2).sum())
-    # Of mid-ranks this is Kruskal and Wallis' statistic, ties allowed for.
+    # With mid-ranks this is the statistic of Kruskal and Wallis, corrected for ties.
     return Driver(key, figure, float(np.sqrt(share)), False, float(chdtrc(len(groups) - 1, (count - 1) * share)))
 
 
 def what_drives(figure: str, drivers: list[Driver]) -> str:
-    """What drives the figure, in one clause; ``drivers`` with the strongest first."""
+    """What drives the figure, as one clause; ``drivers`` are sorted, the strongest first."""
     clear = [driver for driver in drivers if driver.p_value < CLEAR]
     if not clear:
         return f"no varied key drives {figure} beyond chance"
@@ -89,6 +89,6 @@ def what_drives(figure: str, drivers: list[Driver]) -> str:
 
 
 def worst_first(table: pd.DataFrame, figure: str, count: int) -> pd.DataFrame:
-    """The ``count`` rows in which ``figure`` is worst, the worst first."""
+    """The ``count`` rows with the worst values of ``figure``, the worst first."""
     ordered = table[figure].dropna().sort_values(ascending=figure.endswith(LOW_IS_BAD), kind="stable")
     return table.loc[ordered.index[:count]]

@@ -1,4 +1,4 @@
-"""A sweep's folder: which sweep it holds, which cases are done, and the table that follows from them."""
+"""A sweep's folder: the sweep it belongs to, the cases that are done, and the table made from them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from smartshoe.runs.sweeps._design import design_of
 from smartshoe.runs.sweeps._plan import SweepPlan
 
 SCHEMA = "smartshoe.sweep/1"
-LEFT_OVER_S = 3600.0  # after which an unfinished file is a killed process's, not another one's at work
+LEFT_OVER_S = 3600.0  # age after which an unfinished file is no longer being written, but left by a killed process
 
 
 @dataclass(frozen=True, slots=True)
 class SweepFolder:
-    """``path`` with ``sweep.json``, ``cases/NAME.json``, ``results.csv``."""
+    """The folder ``path`` with ``sweep.json``, ``cases/NAME.json`` and ``results.csv``."""
 
     path: Path
 
     @property
     def cases(self) -> Path:
-        """Where the cases lie."""
+        """The folder of the cases."""
         return self.path / "cases"
 
     def claim(self, plan: SweepPlan) -> None:
-        """Make the folder this plan's; raises `UsageError` where it is another sweep's or another version's.
+        """Assign the folder to this plan; raises `UsageError` if it belongs to another sweep or another version.
 
-        A plan that holds all cases of the one before goes on with the folder: so a sweep grows.
+        A plan that contains all cases of the earlier one continues the folder; so a sweep can grow.
         """
         make_folder(self.cases)
         note = self.path / "sweep.json"
@@ -59,7 +59,7 @@ class SweepFolder:
                 f"{self.cases} holds cases of an unknown sweep ({note.name} is gone): choose another --out"
             )
         write_text(note, json_text(_plain(mine)))
-        self._sweep_up()
+        self._remove_unfinished()
 
     def _note(self, note: Path) -> dict[str, Any]:
         try:
@@ -83,8 +83,8 @@ class SweepFolder:
                 f" this one): {begun}choose another --out"
             )
 
-    def _sweep_up(self) -> None:
-        """Remove what killed processes left half-written."""
+    def _remove_unfinished(self) -> None:
+        """Remove unfinished files of killed processes."""
         with os.scandir(self.cases) as entries:
             for entry in entries:
                 is_partial = entry.name.startswith(".") and ".partial" in entry.name
@@ -92,24 +92,27 @@ class SweepFolder:
                     Path(entry.path).unlink(missing_ok=True)
 
     def done(self) -> set[str]:
-        """The names of the cases that are there; an empty file, as a pulled plug leaves it, is none."""
+        """The names of the cases that are done; an empty file, as a power failure may leave it, does not count."""
         with os.scandir(self.cases) as entries:
             cases = (e for e in entries if e.name.endswith(".json") and not e.name.startswith("."))
             return {e.name[:-5] for e in cases if e.stat().st_size > 0}
 
     def put(self, name: str, text: str) -> None:
-        """Write a case, whole or not at all. It does not wait for the disk: what a pulled plug takes is done again."""
+        """Write a case completely or not at all, without waiting for the disk.
+
+        A case that is lost in a power failure is computed again.
+        """
         write_text(self.cases / f"{name}.json", text, durable=False)
 
     def holds(self, name: str) -> bool:
-        """Whether a case is there."""
+        """Whether a case is done."""
         try:
             return (self.cases / f"{name}.json").stat().st_size > 0
         except FileNotFoundError:
             return False
 
     def read(self, name: str) -> dict[str, Any]:
-        """A case's JSON; raises `InputError` where it is damaged."""
+        """A case's JSON; raises `InputError` if it is damaged."""
         file = self.cases / f"{name}.json"
         try:
             found = json.loads(file.read_text(encoding="utf-8"))
@@ -121,7 +124,7 @@ class SweepFolder:
 
 
 def _table_of(plan: SweepPlan) -> dict[str, Any]:
-    """The design as a ``[sweep]`` table that gives it again."""
+    """The design as a ``[sweep]`` table that would produce it again."""
     design = plan.design
     vary: dict[str, Any] = {}
     for axis in design.axes:
@@ -135,20 +138,20 @@ def _table_of(plan: SweepPlan) -> dict[str, Any]:
 
 
 def _plain(content: dict[str, Any]) -> dict[str, Any]:
-    """Dates and times of TOML as text."""
+    """The content with dates and times converted to text."""
     return dict(json.loads(json.dumps(content, default=str)))
 
 
 def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
-    """Write ``results.csv``: a row a case, in the design's order; what each column holds, by name.
+    """Write ``results.csv``, a row for each case in the design's order; returns the kind of each column by name.
 
-    That is "bool", "int", "float", or "text". One case is read at a time, twice: for the header first.
+    A kind is "bool", "int", "float" or "text". Cases are read one at a time, twice, since the header comes first.
     """
     keys = [axis.key for axis in plan.design.axes]
     kinds: dict[str, str] = {}
     for name in plan.names():
         for figure, value in folder.read(name)["figures"].items():
-            kinds[figure] = _wider(kinds.get(figure), value)
+            kinds[figure] = _wider_kind(kinds.get(figure), value)
     figures = list(kinds)
     with replacing(folder.path / "results.csv") as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -156,7 +159,7 @@ def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
         for number, name in enumerate(plan.names()):
             case, values = folder.read(name), plan.design.values(number)
             own = case["figures"]
-            kinds.update({key: _wider(kinds.get(key), values[key]) for key in keys})
+            kinds.update({key: _wider_kind(kinds.get(key), values[key]) for key in keys})
             writer.writerow(
                 [
                     *(_cell(values[key]) for key in keys),
@@ -170,8 +173,8 @@ def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
     return {**kinds, "seed": "int", "status": "text", "says": "text", "case": "text"}
 
 
-def _wider(kind: str | None, value: Any) -> str:
-    """The narrowest kind of column that holds what it held and ``value``."""
+def _wider_kind(kind: str | None, value: Any) -> str:
+    """The narrowest kind of column that can hold values of ``kind`` and ``value``."""
     if value is None:
         return kind or ""
     own = {bool: "bool", int: "int", float: "float"}.get(type(value), "text")
@@ -181,7 +184,7 @@ def _wider(kind: str | None, value: Any) -> str:
 
 
 def _cell(value: Any) -> Any:
-    """A value in a table: numbers in full, nothing for None, JSON for what is neither number nor word."""
+    """A value as a cell of the table: numbers in full precision, None as empty, other objects as JSON."""
     if value is None:
         return ""
     if isinstance(value, bool):

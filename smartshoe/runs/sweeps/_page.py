@@ -1,4 +1,4 @@
-"""The page of a sweep: what drives the figures, how, and the worst cases with the command that repeats each."""
+"""The page of a sweep: what drives the figures, and the worst cases with the commands that repeat them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One figure of merit: its quantiles over the cases, what drives it, charts, the worst cases."""
+    """One figure of merit: its quantiles over the cases, its drivers, charts, and the worst cases."""
 
     figure: str
     quantiles: list[str]
@@ -37,7 +37,7 @@ class Section:
 
 
 def write_page(path: Path, plan: SweepPlan, table: pd.DataFrame) -> None:
-    """Write the page to ``path``, whole or not at all; ``table`` is ``results.csv``, or its main columns."""
+    """Write the page to ``path``, completely or not at all; ``table`` is ``results.csv``, or its main columns."""
     main = main_figures(table, plan)
     failed = table[table["status"] == "failed"]
     numbered = failed["says"].index.to_series().groupby(failed["says"], sort=False)
@@ -74,7 +74,7 @@ def write_page(path: Path, plan: SweepPlan, table: pd.DataFrame) -> None:
 
 
 def _range_of(table: pd.DataFrame, key: str) -> str:
-    """What a key takes, in a few words."""
+    """The values of a key, as short text."""
     values = table[key].dropna().unique().tolist()
     if len(values) > 6 and all(isinstance(value, int | float) for value in values):
         return f"{plain(float(min(values)))} … {plain(float(max(values)))}"

@@ -1,4 +1,4 @@
-"""Where cases are computed: this process, processes of this machine, or a Dask scheduler's workers."""
+"""Places where cases are computed: this process, processes on this machine, or the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from typing import Any, Protocol
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.runs.sweeps._folder import SweepFolder
 
-Compute = Callable[[Any], str]  # from a case to its text
+Compute = Callable[[Any], str]  # from a case to its JSON text
 
-ANSWER_S = 10.0  # within which a scheduler, and then a worker of it, must answer
-AHEAD = "4*n_jobs"  # cases handed out ahead of the workers
+ANSWER_S = 10.0  # time within which a scheduler, and then one of its workers, must answer
+AHEAD = "4*n_jobs"  # number of cases handed out in advance to the workers
 
 
 class Named(Protocol):
-    """A case: whatever computes it, and its ``name``."""
+    """A case with the name by which the folder knows it."""
 
     @property
     def name(self) -> str:
-        """The name that the case's content gives it."""
+        """The name, made from the case's content."""
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A case, and the sweep's folder, which takes it where this process can write there."""
+    """A case to compute, and the sweep's folder, to which it is written if this process can write there."""
 
     case: Named
     folder: SweepFolder
     compute: Compute
 
     def __call__(self) -> tuple[str, str | None]:
-        """The case's name, and its text where somebody else has to write it.
+        """Compute the case; returns its name, and its text if the caller has to write it.
 
-        A case is in the folder before anybody hears of it, so that no kill costs more than what was being computed.
+        A case is written before it is reported as done, so that a kill costs no more than the cases under way.
         """
         if self.folder.holds(self.case.name):
             return self.case.name, None
@@ -47,12 +47,12 @@ class Task:
 
 
 def in_this_process(tasks: Iterable[Task]) -> Iterator[tuple[str, str | None]]:
-    """One after the other, here."""
+    """Compute the tasks one after the other in this process."""
     return (task() for task in tasks)
 
 
 def in_processes(tasks: Iterable[Task], jobs: int) -> Iterator[tuple[str, str | None]]:
-    """On ``jobs`` processes of this machine; raises `WorkerLostError` where one is killed."""
+    """Compute the tasks in ``jobs`` processes on this machine; raises `WorkerLostError` if one of them is killed."""
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
@@ -64,23 +64,23 @@ def in_processes(tasks: Iterable[Task], jobs: int) -> Iterator[tuple[str, str | 
 
 
 class WorkerLostError(DeviceError):
-    """A worker ended in the middle of a case."""
+    """A worker was lost in the middle of a case."""
 
 
 @contextmanager
 def _client_of(address: str) -> Iterator[Any]:
-    """A client of the Dask scheduler at ``address``; raises `UsageError` or `DeviceError` where there is none."""
+    """A client of the Dask scheduler at ``address``; raises `UsageError` or `DeviceError` if it cannot be reached."""
     try:
         from distributed import Client
         from distributed.comm.addressing import get_address_host_port
     except ImportError as error:
         raise UsageError("--scheduler needs Dask: pip install 'smartshoe[cluster]'") from error
     try:
-        # Before a client tries to connect: one that fails on the way in takes long to end, and says so on its own.
+        # Checked before a client connects: a client that fails takes long to end and prints errors of its own.
         get_address_host_port(address)
     except (ValueError, NotImplementedError) as error:
         raise UsageError(f"--scheduler {address} is no address ({error}): give one like tcp://host:8786") from error
-    open_client: Any = Client  # typed or not, as Dask is installed or not
+    open_client: Any = Client  # typed or not, depending on whether Dask is installed
     try:
         client = open_client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError) as error:
@@ -90,7 +90,7 @@ def _client_of(address: str) -> Iterator[Any]:
 
 
 def on_a_cluster(tasks: Iterable[Task], address: str) -> Iterator[tuple[str, str | None]]:
-    """On the workers of a Dask scheduler, through joblib's backend."""
+    """Compute the tasks on the workers of a Dask scheduler, through joblib's backend."""
     with _client_of(address) as client:
         from distributed import CancelledError, KilledWorker
         from distributed.comm.core import CommClosedError

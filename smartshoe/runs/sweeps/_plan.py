@@ -1,4 +1,4 @@
-"""The plan of a sweep: each case's scenario, and the name that its content gives it."""
+"""The plan of a sweep: the scenario of each case, and a name made from its content."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from smartshoe.runs.scenario import (
 from smartshoe.runs.sweeps._design import SweepDesign, design_of
 from smartshoe.version import __version__
 
-UNSEEN = ("sweep", "title", "about")  # of a scenario's keys: what no figure depends on
-NAME_DIGITS = 24  # of a case's name: 96 bits, so that no two of 100,000 cases share one
+UNSEEN = ("sweep", "title", "about")  # keys of a scenario that no figure depends on
+NAME_DIGITS = 24  # of a case's name: 96 bits, so that names do not collide among 100,000 cases
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One case, whole: what a process anywhere needs to compute it."""
+    """One case with everything that is needed to compute it in any process."""
 
     name: str
     source: str
@@ -41,7 +41,7 @@ class Case:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """A scenario and its design. ``files`` maps a file that the scenario reads to the digest of what it holds."""
+    """A scenario and its design; ``base`` are the scenario's tables without ``[sweep]``."""
 
     source: ScenarioText
     base: Tables
@@ -53,19 +53,19 @@ class SweepPlan:
         return len(self.design)
 
     def tables(self, case: int) -> Tables:
-        """The whole scenario of a case."""
+        """The complete scenario of a case."""
         return {**with_values(self.base, self.design.values(case)), "seed": self.design.seed(case)}
 
     def name(self, case: int) -> str:
-        """The case's name: a hash of its scenario, the files that it reads, its seed and smartshoe's version."""
+        """The case's name: a hash of its scenario, the files that it reads, its seed and the version of smartshoe."""
         return self._name_of(self.tables(case))
 
     def names(self) -> Iterator[str]:
-        """Every case's name, in the design's order; equal cases have equal names."""
+        """The names of all cases, in the design's order; equal cases have equal names."""
         return (self.name(case) for case in range(len(self)))
 
     def case(self, number: int) -> Case:
-        """The case as it is sent to where it is computed."""
+        """The case as an object that can be sent to a worker."""
         tables = self.tables(number)
         return Case(
             self._name_of(tables),
@@ -93,9 +93,9 @@ class SweepPlan:
         return self._digests[name]
 
     def check(self) -> None:
-        """Try each value of each key by itself on a scenario that is opened and not run; for a range, both ends.
+        """Check each value of each key on its own by opening the scenario's devices; of a range, both ends.
 
-        Raises `ScenarioError` that names the key.
+        Raises `ScenarioError`, which names the key.
         """
         for axis in self.design.axes:
             try:
@@ -116,7 +116,7 @@ class SweepPlan:
             check_simulated(checked(first, self.source), self.source)
 
     def _blame(self, key: str, value: Any, error: ScenarioKeyError) -> ScenarioError:
-        """The error as the key's own, unless the scenario with its own value has it too."""
+        """Attribute the error to ``key``, unless the scenario has the same error with its own value of that key."""
         others = {axis.key: axis.ends()[0] for axis in self.design.axes if axis.key != key}
         try:
             check_simulated(checked(with_values(self.base, others), self.source), self.source)
@@ -127,7 +127,7 @@ class SweepPlan:
 
 
 def read_plan(path: Path | str) -> SweepPlan:
-    """The sweep that a scenario file asks for, checked; raises `ScenarioError`."""
+    """Read and check the sweep in a scenario file; raises `ScenarioError`."""
     tables, source = read_tables(path)
     base = {key: value for key, value in tables.items() if key != "sweep"}
     seed = base.get("seed", 0)
@@ -138,7 +138,7 @@ def read_plan(path: Path | str) -> SweepPlan:
 
 
 def _files_of(tables: Tables) -> list[str]:
-    """The files that a scenario reads, as it names them: recordings, twins, replayed and logged devices."""
+    """The files that a scenario reads, as it names them: recordings, twins, and devices of type replay and log."""
     found: list[Any] = []
     for unit in tables.get("unit", []):
         found += unit.get("recordings", [])

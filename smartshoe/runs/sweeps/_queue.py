@@ -1,4 +1,4 @@
-"""The folder as a queue: what is not in it is computed, wherever that is, and lies in it before anybody hears of it."""
+"""Uses a sweep's folder as a queue: cases that are not in it are computed and written before they are reported."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from smartshoe.runs.sweeps._places import Compute, Named, Task, WorkerLostError
 
 Progress = Callable[[int, int], None]
 
-LOST_WITHOUT_PROGRESS = 5  # workers killed in a row, with no case done between, before the sweep gives up
+LOST_WITHOUT_PROGRESS = 5  # number of workers killed in a row, without a case done, after which the sweep gives up
 
 
 class Cases(Protocol):
-    """Cases by number (0-based): the name that content gives each, and the case whole."""
+    """A numbered (0-based) set of cases."""
 
     def name(self, number: int) -> str:
         """The case's name; equal cases have equal names."""
 
     def case(self, number: int) -> Named:
-        """The case as it is sent to where it is computed."""
+        """The case as an object that can be sent to a worker."""
 
 
 Place = Callable[[Iterator[Task]], Iterator[tuple[str, str | None]]]
 
 
 def place_of(jobs: int | None, scheduler: str | None, cases: int) -> Place:
-    """Where cases are computed: a Dask scheduler's workers, this process, or ``jobs`` processes (None: one a core)."""
+    """Where to compute cases: a Dask scheduler's workers, this process, or ``jobs`` processes (None: one a core)."""
     if scheduler is not None:
         return lambda tasks: places.on_a_cluster(tasks, scheduler)
     if jobs is None:
@@ -43,7 +43,7 @@ def place_of(jobs: int | None, scheduler: str | None, cases: int) -> Place:
 
 
 def shard_of(cases: int, shard: tuple[int, int]) -> range:
-    """The cases of part k of n: every n-th one from the k-th on (1-based); raises `UsageError` for a part of none."""
+    """The cases of part k of n: every n-th from the k-th on (1-based); raises `UsageError` if there is no such part."""
     part, parts = shard
     if not 1 <= part <= parts:
         raise UsageError(f"shard {part}/{parts} is none: give K/N with K from 1 to N")
@@ -58,12 +58,12 @@ def compute_all(
     compute: Compute,
     progress: Progress | None = None,
 ) -> int:
-    """Compute those of ``mine`` that are not in the folder, and say how many they were.
+    """Compute those of ``mine`` that are not in the folder, and return their number.
 
-    Raises `DeviceError` where workers are killed again and again, or the cluster went away.
+    Raises `DeviceError` if workers are killed again and again, or if the cluster is lost.
     """
     to_do = _to_do(cases, folder, mine)
-    there = SweepFolder(folder.path.resolve())  # for workers in another folder
+    there = SweepFolder(folder.path.resolve())  # an absolute path, since workers may run in another working folder
     whole = len(to_do)
     counted = lost = 0
     while to_do:
@@ -90,7 +90,7 @@ def compute_all(
 
 
 def _to_do(cases: Cases, folder: SweepFolder, mine: Sequence[int]) -> list[int]:
-    """The first of each kind of equal cases that is not done."""
+    """The numbers of the cases that are not done; of equal cases only the first."""
     seen = folder.done()
     found: list[int] = []
     for number in mine:

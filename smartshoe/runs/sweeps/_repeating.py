@@ -12,7 +12,7 @@ from smartshoe.runs.sweeps._plan import SweepPlan
 
 
 def command_of(plan: SweepPlan, case: int) -> str:
-    """``smartshoe run`` with the seed and the values of a case (0-based)."""
+    """The ``smartshoe run`` command with the seed and the values of a case (0-based)."""
     words = ["smartshoe", "run", str(plan.source.path), "--seed", str(plan.design.seed(case))]
     for key, value in plan.design.values(case).items():
         words += ["--set", f"{key}={toml_text(value)}"]
@@ -20,7 +20,7 @@ def command_of(plan: SweepPlan, case: int) -> str:
 
 
 def toml_text(value: Any) -> str:
-    """A value as TOML writes it, on one line."""
+    """A value in TOML syntax, on one line."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{json.dumps(str(k))} = {toml_text(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list | tuple):

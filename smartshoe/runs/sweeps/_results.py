@@ -1,4 +1,4 @@
-"""A sweep's table read again: whole for its user, and in the few columns that the page and the terminal tell of."""
+"""Reads a sweep's table, completely or only the columns needed for the page and the terminal; writes it as Parquet."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ BLOCK_BYTES = 1 << 18
 
 
 def read_results(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
-    """``results.csv``, one row a case in the design's order; all columns, or only those named."""
+    """``results.csv`` with one row for each case in the design's order; all columns, or only those named."""
     import pandas as pd
 
     return pd.read_csv(path, usecols=columns, keep_default_na=False, na_values=[""])
 
 
 def main_results(path: Path, plan: SweepPlan) -> pd.DataFrame:
-    """The varied keys, the main figures and how each case ended: a sweep of 100,000 cases has a table of 100 MB."""
+    """The varied keys, the main figures and the outcome of each case; the table of 100,000 cases is 100 MB large."""
     with path.open(encoding="utf-8", newline="") as file:
         header = next(csv.reader(file))
     keys = [axis.key for axis in plan.design.axes]
@@ -35,7 +35,7 @@ def main_results(path: Path, plan: SweepPlan) -> pd.DataFrame:
     table = read_results(path, [*beside, *(name for name in figures if name.endswith(MAIN))])
     if main_figures(table, plan):
         return table
-    for name in figures:  # none of the usual ones: the first that differs between cases
+    for name in figures:  # no usual figure is there: take the first one that differs between cases
         table = read_results(path, [*beside, name])
         if main_figures(table, plan):
             break
@@ -43,7 +43,7 @@ def main_results(path: Path, plan: SweepPlan) -> pd.DataFrame:
 
 
 def write_parquet(results: Path, kinds: Mapping[str, str], target: Path) -> None:
-    """Write the table of ``results`` as Parquet, by pyarrow, block by block; ``kinds`` says what each column holds."""
+    """Write the table of ``results`` as Parquet, block by block; ``kinds`` is the kind of each column by name."""
     import pyarrow
     from pyarrow import csv as arrow_csv
     from pyarrow import parquet
@@ -56,7 +56,7 @@ def write_parquet(results: Path, kinds: Mapping[str, str], target: Path) -> None
         arrow_csv.ParseOptions(newlines_in_values=True),
         arrow_csv.ConvertOptions(column_types=types, null_values=[""], strings_can_be_null=True),
     )
-    # Numbers that are all different make dictionaries of a megabyte a column, and no smaller a file.
+    # For columns of distinct numbers dictionaries take a megabyte each and make the file no smaller.
     repeated = {"use_dictionary": ["status", "says"]}
     with blocks, replacing(target) as temporary, parquet.ParquetWriter(temporary, blocks.schema, **repeated) as writer:
         for block in blocks:

@@ -1,4 +1,4 @@
-"""The verb: a scenario over its design, each case computed once, whatever is killed in between."""
+"""`sweep`: runs a scenario over its design, each case once, even if processes are killed in between."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """What a sweep came to: ``cases`` in all, ``computed`` this time, ``missing`` still (another shard's), ``failed``.
+    """The result of a sweep: the numbers of ``cases``, of those ``computed`` now, still ``missing``, and ``failed``.
 
-    ``failed`` is None while cases are missing: then there are no ``results`` and no ``report`` yet either.
+    While cases are missing (another shard may compute them), ``failed``, ``results`` and ``report`` are None.
     """
 
     plan: SweepPlan
@@ -36,11 +36,11 @@ class SweepResult:
     report: Path | None
 
     def table(self) -> pd.DataFrame:
-        """``results.csv``: one row a case in the design's order; raises `UsageError` while cases are missing."""
+        """``results.csv``, one row a case in the design's order; raises `UsageError` while cases are missing."""
         return read_results(self._results)
 
     def main_table(self) -> pd.DataFrame:
-        """Of `table` the varied keys, seed, main figures, status and sentence: less memory where cases are many."""
+        """Only the varied keys, seed, main figures, status and sentence of `table`, which need less memory."""
         return main_results(self._results, self.plan)
 
     @property
@@ -50,7 +50,7 @@ class SweepResult:
         return self.results
 
     def to_dict(self) -> dict[str, Any]:
-        """The counts as a plain object, schema smartshoe.sweep_summary/1."""
+        """The counts as an object for JSON, in schema smartshoe.sweep_summary/1."""
         return {
             "schema": "smartshoe.sweep_summary/1",
             "scenario": self.plan.source.path.name,
@@ -75,32 +75,32 @@ def sweep(
 ) -> SweepResult:
     """Run a scenario for each case of its ``[sweep]``, and gather the figures in one table.
 
-    A case is computed once: the same call again goes on where the last one stopped.
+    Each case is computed once: the same call again continues where the last one stopped.
 
     Parameters
     ----------
     scenario
         The scenario's file, with a table ``[sweep]``.
     out
-        The sweep's folder. ``cases/`` gets one JSON a case, ``results.csv`` (``.parquet`` where pyarrow is there) one
-        row a case, ``sweep.html`` what drives the figures.
+        The sweep's folder. ``cases/`` gets a JSON file for each case, ``results.csv`` (and ``.parquet`` if pyarrow is
+        installed) a row for each case, and ``sweep.html`` shows what drives the figures.
     jobs
-        Processes on this machine; None: one a core; 1: this process.
+        Number of processes on this machine; None means one for each core, 1 this process.
     scheduler
         Address of a Dask scheduler (``tcp://host:8786``) whose workers compute instead.
     shard
-        (k, n): only every n-th case from the k-th on (1-based), for one of n runs that share the folder.
+        (k, n): compute only every n-th case from the k-th on (1-based), as one of n runs that share the folder.
     progress
-        Called with the number of cases done and to do, of this run.
+        Called with the number of cases done and to do in this run.
 
     Raises
     ------
     ScenarioError
         The scenario or its ``[sweep]`` is wrong.
     UsageError
-        The folder is another sweep's, or cannot be written.
+        The folder belongs to another sweep, or cannot be written.
     DeviceError
-        The scheduler is not there or went away, or workers are killed again and again.
+        The scheduler cannot be reached or was lost, or workers are killed again and again.
     """
     return sweep_plan(read_plan(scenario), Path(out), jobs, scheduler, shard, progress)
 
@@ -114,7 +114,7 @@ def sweep_plan(
     progress: Progress | None = None,
     compute: Compute = computed,
 ) -> SweepResult:
-    """`sweep` of a plan that was read already; ``compute`` turns a case into its JSON text."""
+    """`sweep` for a plan that was read already; ``compute`` turns a case into its JSON text."""
     mine = shard_of(len(plan), shard)
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}: give 1 or more")
@@ -133,10 +133,10 @@ def _missing(plan: SweepPlan, folder: SweepFolder) -> int:
 
 
 def _concluded(plan: SweepPlan, folder: SweepFolder, count: int) -> SweepResult:
-    """The table and the page, from the cases."""
+    """Write the table and the page from the cases."""
     from smartshoe.runs.sweeps._page import write_page
 
-    folder.claim(plan)  # of two sweeps that took the folder at the same moment, the first to end sees it here
+    folder.claim(plan)  # if two sweeps took the folder at the same moment, the first one to end notices it here
     kinds = write_results(plan, folder)
     results = folder.path / "results.csv"
     report = folder.path / "sweep.html"

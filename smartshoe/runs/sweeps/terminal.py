@@ -1,4 +1,4 @@
-"""A sweep's outcome on a terminal."""
+"""Prints a sweep's result on a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from smartshoe.runs.sweeps._running import SweepResult
 
 
 def print_sweep(result: SweepResult) -> None:
-    """Counts, the main figures' medians and worst, what drives each, and where the files lie."""
+    """Print the counts, the main figures' median and range, what drives each, and the paths of the files."""
     found = result.main_table()
     shown = table_of("figures over the cases", ["figure", "median", "5 %", "95 %"])
     figures = main_figures(found, result.plan)
