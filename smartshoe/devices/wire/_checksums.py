@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 
-FEW = 2000  # frames up to which one look-up of all their bytes stays in the cache, and is faster
+FEW = 2000  # frames: up to so many, one look-up of all their bytes fits the cache and is faster
 
 
 def checksum(data: bytes) -> int:
@@ -32,7 +32,7 @@ def _tables(length: int) -> tuple[int, NDArray[np.uint16]]:
 
 
 def checksums(columns: Bytes) -> NDArray[np.uint16]:
-    """Checksums (n,) of the frames whose bytes are ``columns`` (length, n): each byte adds its own."""
+    """Checksums (n,) of the frames whose bytes are ``columns`` (length, n), as XOR of each byte's contribution."""
     base, tables = _tables(len(columns))
     if columns.shape[1] < FEW:
         places = 256 * np.arange(len(columns), dtype=np.intp)[:, None]
