@@ -1,4 +1,4 @@
-"""Calibrations as users have them: objects, the files that ``identify``, ``diagnose`` and ``run`` write, folders."""
+"""Finds calibrations as users have them: objects, files written by ``identify``, ``diagnose`` and ``run``, folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""C99 of the arithmetic that exported integers run on: products, quotients, roots, powers of 64-bit counts."""
+"""C99 code of the integer arithmetic of exported filters: products, quotients, roots, powers of 64-bit counts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _EXPONENTIAL_TERMS = 14  # of a series in at most 0.35: the next is 0.35^15/15! 
 
 
 def functions_text(used: Set[str], fraction: int) -> str:
-    """The functions ``used`` and those that they call, in an order in which each is known before it is called."""
+    """The functions ``used`` and those they call, ordered so that each is defined before it is called."""
     texts = _texts(fraction)
     needed: set[str] = set()
     open_ = list(used)

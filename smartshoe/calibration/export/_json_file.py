@@ -1,4 +1,4 @@
-"""Target ``json``: every form of the filter as numbers, for tools of any language."""
+"""Target ``json``: every form of the filter as numbers, for tools in any language."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SCHEMA = "smartshoe.export/1"
 
 
 def json_files(model: FilterModel) -> dict[str, str]:
-    """NAME.json, file name to text; full precision, a missing reading of the test vector is null."""
+    """NAME.json, file name to text; numbers in full precision, a missing reading of the test vector as null."""
     calibration = model.calibration
     found: dict[str, Any] = {
         "schema": SCHEMA,

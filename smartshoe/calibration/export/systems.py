@@ -17,9 +17,8 @@ def scipy_system(
 ) -> TransferFunction:
     """Force in N over the reading less its offset, as a `scipy.signal` transfer function.
 
-    Discrete at ``sample_rate_hz`` (the calibration's own where none is given), with the very numbers that the
-    compensator runs; ``continuous`` gives (b0 s + b1)/(s + a1), Chinimilli 2016 (13). Of an extended calibration it
-    is the linear part.
+    Discrete at ``sample_rate_hz`` (by default the calibration's own), with the very numbers that the compensator runs;
+    ``continuous`` gives (b0 s + b1)/(s + a1), Chinimilli 2016 (13). Of an extended calibration it is the linear part.
     """
     from scipy import signal
 
