@@ -1,4 +1,4 @@
-"""A neighbour's reading in this one; how it couples stands in `simulators.effects.room`."""
+"""Hidden effects: a neighbour's reading leaking into this one; `simulators.effects.room` has the coupling."""
 
 from __future__ import annotations
 
