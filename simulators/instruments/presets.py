@@ -37,5 +37,5 @@ def bladder(unit: str) -> BladderParameters:
 
 
 def sensor(unit: str) -> HdiParameters:
-    """A unit's sensor."""
+    """A unit's sensor, with the range of its place."""
     return HdiParameters(range_pa=sensor_range_pa(unit))
