@@ -1,4 +1,7 @@
-"""Vendor files to `Recording` and back: `read` and `write` for every format, known by content first, suffix second."""
+"""Converts vendors' files to `Recording` and back: `read` and `write`.
+
+Formats are recognised by content, then suffix.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ def detect(path: Path | str) -> Format:
         if format_.sniff(path, head):
             return format_
     for format_ in formats():
-        # A text suffix on a file that is no text says nothing; others give a reader that can name the fault.
+        # A text suffix on a binary file is meaningless; other suffixes select a reader that can report the fault.
         if path.suffix.casefold() in format_.suffixes and not format_.is_text:
             return format_
     raise FormatError(
@@ -48,9 +51,9 @@ def detect(path: Path | str) -> Format:
 
 
 def read_sheet(path: Path | str) -> Sheet:
-    """The columns of any readable file as they stand in it; raises `InputError` and its kin.
+    """The columns of any readable file as they are in it; raises `InputError` and its subclasses.
 
-    The one place where a format's reader runs, ours or another's: whatever goes wrong in it becomes one sentence.
+    All formats' readers, our own and others', run here, so that any failure becomes one sentence.
     """
     if not isinstance(path, (str, os.PathLike)):
         raise UsageError(f"path is of type {type(path).__name__}: give the name of a file")
