@@ -1,4 +1,4 @@
-"""What grew with the dose of load undone: sets are taken off, gains divided by, while the load is found that did it."""
+"""Inverse of effects that grow with the dose of load (sets, gains), while recovering the load that caused them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sensor and a logger do to a signal, where each sample needs weights of its own."""
+"""Effects of a sensor and a logger on a signal, where each sample needs its own weights."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def lagged_by_direction(start, rise, keep_rising, fall, keep_falling):  # type: ignore[no-untyped-def]
-    """w (n,), each ``keep`` of the value before and the drive of its step: ``rise`` (n,) where it rises, else ``fall``.
+    """w (n,), each ``keep`` times the value before plus the drive of its step: ``rise`` (n,) if w rises, else ``fall``.
 
-    Where neither way leads up nor down, what is followed crosses, and it stays.
+    Where neither leads w in its own direction, the followed signal crosses w, and w stays.
     """
     out = np.empty(rise.size)
     last = start

@@ -15,7 +15,7 @@ _BANK = "float64[:, ::1]"
 
 @njit(inline="always", error_model="numpy")
 def _step(reading, bank, unit):  # type: ignore[no-untyped-def]
-    """Force of one reading of one unit; its column of ``bank`` moves on."""
+    """Force of one reading of one unit; updates the unit's column of ``bank``."""
     if not np.isfinite(reading):
         bank[7, unit] += 1.0
         reading = bank[6, unit]
@@ -33,7 +33,7 @@ def _step(reading, bank, unit):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean(float64[::1], float64[::1], {_BANK})", cache=True, error_model="numpy")
 def push_tick(readings, forces_n, bank):  # type: ignore[no-untyped-def]
-    """Write the forces (units,) of one tick of readings (units,); False, and nothing done, where shapes differ."""
+    """Write the forces (units,) of one tick of readings (units,); False, without any effect, where shapes differ."""
     units = bank.shape[1]
     if readings.size != units or forces_n.size != units:
         return False
