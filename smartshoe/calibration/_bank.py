@@ -43,7 +43,7 @@ class CompensatorBank:
         return len(self.filters)
 
     def reset(self) -> None:
-        """Forget the past of every unit."""
+        """Return all filters to their initial state."""
         self._bank[5:] = np.array([[0.0], [np.nan], [0.0]])
 
     @property
@@ -106,7 +106,7 @@ class MixedBank(CompensatorBank):
         self._others = tuple((k, item) for k, item in enumerate(self.filters) if not isinstance(item, Compensator))
 
     def reset(self) -> None:
-        """Forget the past of every unit."""
+        """Return all filters to their initial state."""
         super().reset()
         for _, item in self._others:
             item.reset()
@@ -134,7 +134,7 @@ def _column(item: ForceFilter) -> list[float]:
 
 
 def stack(filters: Sequence[ForceFilter]) -> CompensatorBank:
-    """A bank of filters, one a unit, that run side by side, each from a fresh start.
+    """A bank of filters, one per unit, that run together, each from its initial state.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def stack(filters: Sequence[ForceFilter]) -> CompensatorBank:
     Raises
     ------
     UsageError
-        Where there is none, or their rates differ.
+        Where no filter is given, or their rates differ.
 
     Examples
     --------

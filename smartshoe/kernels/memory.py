@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
+_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; NaN is still handled
 _BISECTIONS = 50
 SOLVED = 1e-14  # of full scale: tolerated residual of an inverse's equation
 STEPS, CLOSE = 60, 1e-9  # of Newton's and similar methods; after a smaller Newton step the error is about its square
@@ -83,11 +83,12 @@ def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ig
 
 @njit(cache=True)
 def closer(step, at, left, low, high, under, over, stays):  # type: ignore[no-untyped-def]
-    """Where the zero of a rising ``left`` is sought after ``at``, and its bracket. First the ends, ``low``, ``high``.
+    """Next point in the search for the zero of an increasing ``left``, after ``at``, and the updated bracket.
 
-    From ``step`` 2 on by the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counts
-    half. ``under`` and ``over`` are what is left at the ends; ``stays``: 1 if ``high`` stayed, -1 if ``low`` did. In C
-    `smartshoe.models.effects._false_position`.
+    The first two steps evaluate the ends ``low`` and ``high``. From ``step`` 2 on the Illinois method is used (Dowell
+    and Jarratt 1971): false position, in which an end that stays twice counts half. ``under`` and ``over`` are the
+    values at the ends; ``stays`` is 1 if ``high`` stayed, -1 if ``low`` did. `smartshoe.models.effects._false_position`
+    is the same in C.
     """
     if step == 0:
         return high, low, high, left, over, stays
@@ -191,7 +192,7 @@ def bouc_wen(load, per_load, z, slope, state, out):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def _left(fading, load):  # type: ignore[no-untyped-def]
-    """The share of friction that is left under a ``load``."""
+    """The share of friction that remains under a ``load``."""
     return min(max(1.0 - fading * load, 0.0), 1.0)
 
 
@@ -256,11 +257,11 @@ def sense_of_motion(load, width, fade, state, out):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the sense of the backlash of out.
+    """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the `sense_of_motion` of the backlash of out.
 
-    Within the dead zone the sense is as it was; a signal beyond what that gives is sought beyond its end. Where
-    unloading has more gain, a load that turns raises the signal like one that goes on: the signal's next fall tells.
-    ``state`` (2,) as in `sense_of_motion`.
+    Within the dead zone s does not change; for a signal that this cannot explain, the load is sought outside the dead
+    zone. Where unloading has more gain, a load that turns raises the signal like one that keeps rising; which one it
+    was shows in the signal's next fall. ``state`` (2,) as in `sense_of_motion`.
     """
     last, sense = state
     for k in range(signal.size):
@@ -325,9 +326,9 @@ def conditioned_undone(signal, strength, per_cycle, by_way, stretch, least, widt
 
     n = (1 - by_way) (N per_cycle)^stretch + by_way L/2 per_cycle.
 
-    N are the cycles of out, as in `cycles_done`, L is the way of its play of ``width``. Each sample is sought in at
-    most ``rounds``, until one moves it by no more than ``settled``. ``state`` (5,): N, trough and peak of the cycle,
-    the play (each NO_LOAD before the first sample), L/2.
+    N is the number of cycles of out, as in `cycles_done`; L is the path length of its play of ``width``. Each sample is
+    iterated for at most ``rounds``, until it changes by no more than ``settled``. ``state`` (5,): N, trough and peak of
+    the cycle, the play (each NO_LOAD before the first sample), L/2.
     """
     count, trough, peak, place, gone = state
     for k in range(signal.size):
@@ -354,13 +355,14 @@ def conditioned_undone(signal, strength, per_cycle, by_way, stretch, least, widt
 
 @njit(cache=True)
 def rate_undone(signal, strength, exponent, least, softness, dead_zone, step_s, keep, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 + strength s(r)) = ``signal`` (n,), r the rate that raised the signal's own smoothed rate.
+    """out (n,) with out (1 + strength s(r)) = ``signal`` (n,), r the rate that explains the signal's own smoothed rate.
 
-    The factor is no less than ``least``.
+    The factor is at least ``least``.
 
-    s(r) = (r^2 + softness^2)^(exponent/2) - softness^exponent; the signal's rate r (1 + strength s(r)), as on a ramp,
-    is a first-order mean with ``keep`` a step of its way through a play of ``dead_zone``. (From the rate of what comes
-    out, unloading would be unstable.) ``state`` (2,): last cleaned signal (NO_LOAD before the first), its rate.
+    s(r) = (r^2 + softness^2)^(exponent/2) - softness^exponent. The signal's rate equals r (1 + strength s(r)), as on a
+    ramp; it is measured as a first-order mean, with ``keep`` per step, of the signal's changes beyond a play of
+    ``dead_zone``. (With the rate of the output instead, unloading would be unstable.) ``state`` (2,): last cleaned
+    signal (NO_LOAD before the first), its rate.
     """
     last, seen = state
     floor = softness**exponent
@@ -443,9 +445,9 @@ def tanh(x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def softness(x, power, corner):  # type: ignore[no-untyped-def]
-    """Share of the softening that is there at x = (M^2 - u^2)/wide below the largest, tanh(x^power), and its slope.
+    """Share of the softening at x = (M^2 - u^2)/wide below the largest load, tanh(x^power), and its slope over x.
 
-    Last, by how much the slope's logarithm falls with x. A power that is no 1 has its corner at the largest load
+    Also the decrease of the slope's logarithm with x. For a power other than 1 the corner at the largest load is
     rounded by EASED, which leaves ``corner``, EASED^power.
     """
     if power == 1.0:
@@ -461,7 +463,7 @@ def softness(x, power, corner):  # type: ignore[no-untyped-def]
 def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untyped-def]
     """phi of a first loading, own phi + arm u = ``load`` >= 0 and u = phi rise(phi), and the slope of the load in u.
 
-    Newton from ``phi``, held in a bracket; own + arm (1 + raised) is above zero.
+    Newton from ``phi``, kept in a bracket; own + arm (1 + raised) must be above zero.
     """
     if raised == 0.0:
         return load / (own + arm), own + arm
@@ -471,7 +473,7 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
     for _ in range(STEPS):
         bend = tanh(phi * phi / width)
         off = phi * (own + arm * (1.0 + raised * bend)) - load
-        slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # of u in phi
+        slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # du/dphi
         phi, low, high, step = newton(phi, off, own + arm * slope, low, high)
         if abs(step) <= CLOSE:
             break
@@ -480,9 +482,9 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
 
 @njit(cache=True)
 def softened_undone(signal, strength, width, widening, raised, power, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u (1 - strength softness(M^2 rise^2 - u^2))/rise of the ``signal`` u (n,), M the largest out.
+    """out (n,) = u (1 - strength softness(M^2 rise^2 - u^2))/rise for ``signal`` u (n,), with M the largest out so far.
 
-    ``state`` (1,): that largest, less ``dead_zone``.
+    ``state`` (1,): M less ``dead_zone``.
     """
     largest, corner = state[0], EASED**power
     for k in range(signal.size):
