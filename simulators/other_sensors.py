@@ -87,7 +87,7 @@ def presses(
 
 
 def one_press(rng: Generator, number: int) -> tuple[Array, Array]:
-    """A rest, one press at a rate that changes from recording to recording, a rest."""
+    """A rest, one press whose rate changes from recording to recording, and a rest."""
     ramp_s, peak = (0.2, 0.5, 1.0, 2.0)[number % 4], rng.uniform(10.0, 40.0)
     time_s = np.arange(0.0, 8.0, 0.01)
     corners_s = [0.0, 1.0, 1.0 + ramp_s, 2.5 + ramp_s, 2.5 + 2 * ramp_s, 8.0]
@@ -95,7 +95,7 @@ def one_press(rng: Generator, number: int) -> tuple[Array, Array]:
 
 
 def stretch(rng: Generator, number: int) -> tuple[Array, Array]:
-    """One cycle of a strip, each recording faster than the last."""
+    """One stretching cycle of a strip, faster in each recording."""
     seconds, rate_hz = ((200.0, 10.0), (66.0, 20.0), (40.0, 20.0))[number]
     time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
     return time_s, np.interp(time_s, [0.0, 0.5 * seconds, seconds], [0.0, 1.0, 0.0])
@@ -146,7 +146,7 @@ class OtherSensor:
     fitted: int = 2
     held_out: int = 2
     logs: Callable[[LoadHistory], Mapping[str, Array]] = lambda history: {}
-    """Channels beside the reading, by column."""
+    """Channels logged beside the reading, by column."""
 
     def recordings(self, seed: int) -> tuple[list[Recording], list[Recording]]:
         """The recordings to fit, and those to judge the fit on."""

@@ -66,7 +66,7 @@ def from_stiffness(k1: float, k2: float, c: float = 1.0) -> Filter:
 
 
 def printed(unit: str) -> Filter:
-    """Table 1's transfer function."""
+    """The filter of a unit that Table 1 prints."""
     return Filter(*TABLE_1[unit][2:])
 
 
@@ -86,7 +86,7 @@ def x_needed(unit: str) -> float:
 
 
 def rounding_loss_n() -> float:
-    """Largest error in N, left toe, on a held 800 N when its z-coefficients are rounded to four decimals."""
+    """Largest error in N of the left toe at a held 800 N, caused by rounding its z-coefficients to four decimals."""
     exact = from_stiffness(*TABLE_1["left_toe"][:2])
     rounded = Filter(*(round(value, 4) for value in (exact.n0, exact.n1, exact.d1)))
     hold = np.full(int(60 * RATE_HZ), PEAK_N / exact.static_gain)

@@ -67,7 +67,7 @@ class Provider:
     ) -> SimulatedShoe:
         """A shoe (closed, to be used in a with block) for ``target`` 'walk', 'stand', 'run' or 'tiptoe'.
 
-        ``options`` are `simulators.benches.shoe_options.ShoeOptions`; raises as `open_machine` does.
+        ``options`` are `simulators.benches.shoe_options.ShoeOptions`; raises the errors of `open_machine`.
         """
         _require(target, SHOES, "shoe")
         import numpy as np

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 
 class SmartShoeError(Exception):
-    """Root of every error that smartshoe raises on purpose; ``exit_status`` is the command line's."""
+    """Root of all errors that smartshoe raises deliberately; ``exit_status`` is that of the command line."""
 
     exit_status = 2
 
 
 class UsageError(SmartShoeError, ValueError):
-    """A command line, an argument or an output place is wrong."""
+    """A command line, an argument or an output path is wrong."""
 
 
 class ScenarioError(UsageError):

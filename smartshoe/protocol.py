@@ -132,9 +132,9 @@ def static_protocol(
     loads_n
         The loads that are held, in N.
     rate_n_per_s
-        Of the ramps, in N/s.
+        Rate of the ramps, in N/s.
     approach_n, approach_s
-        The last newtons of a load are put on slowly, within so many seconds.
+        The last part of each load, in N, which is applied slowly, and how long that takes, in s.
     hold_s, rest_s
         How long a load is held, and the rest after it, in s.
 
@@ -172,11 +172,11 @@ def dynamic_protocol(
     rates_n_per_s
         Loading and unloading rate of each triangle, in N/s.
     peak_n
-        Where it turns, in N.
+        Peak load of the triangles, in N.
     repeats
-        How often all of them come.
+        How often the whole series of rates is repeated.
     rest_s
-        Before and after each, in s. The paper gives no rest between triangles; 0 leaves it out.
+        Rest before and after each triangle, in s. The paper states no rest between triangles; 0 omits it.
 
     Notes
     -----

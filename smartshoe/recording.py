@@ -281,7 +281,7 @@ class Recording(Summarised):
         return bool(step.size == 0 or np.all(np.abs(step - np.median(step)) <= SAME_STEP * np.median(step)))
 
     def plot(self) -> Figure:
-        """A figure: every channel over time, those of one unit of measurement on one axis; NaN leaves a gap."""
+        """A figure of every channel over time, with one axis per unit of measurement; NaN leaves a gap."""
         symbols = list(dict.fromkeys(channel.unit.symbol for channel in self.channels.values()))
         figure, axes = panels(max(len(symbols), 1))
         for axis, symbol in zip(axes, symbols, strict=False):

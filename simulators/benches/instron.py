@@ -98,7 +98,7 @@ class SimulatedInstron(TestMachine):
 
     @property
     def logs(self) -> tuple[Recording, ...]:
-        """Bluehill's log (own clock) and the myRIO's (voltages) of the last run."""
+        """Bluehill's log (with its own clock) and the myRIO's (voltages) of the last run."""
         return self._logs
 
     @property

@@ -246,7 +246,7 @@ class LawfulSensor(Sensor):
 
 
 def machine_of(options: Options, seed: int) -> SimulatedInstron:
-    """The machine with these options, its noise fixed by ``seed``."""
+    """The machine with these options, with noise that ``seed`` determines."""
     return provider.open_machine("instron", options, np.random.default_rng([seed, 2]))
 
 

@@ -66,7 +66,7 @@ class BankCase:
 
     @cached_property
     def noise_free_hold_out(self) -> tuple[Recording, ...]:
-        """Twins of ``hold_out`` without noise on load and reading."""
+        """Twins of the ``hold_out`` recordings without noise on load and reading."""
         fitted = len(self.recordings)
         return _cut(
             self.plan,

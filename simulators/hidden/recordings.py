@@ -54,12 +54,12 @@ class HiddenCase:
 
     @cached_property
     def noise_free(self) -> tuple[Recording, ...]:
-        """Twins without noise, with effects and nuisances."""
+        """Twins of all recordings without noise, but with effects and nuisances."""
         return _recorded(self.noise_free_options, self.protocols, self.seed)
 
     @cached_property
     def clean(self) -> tuple[Recording, ...]:
-        """Twins without noise and without the effects."""
+        """Twins of all recordings without noise and effects, but with nuisances."""
         return _recorded(self.clean_options, self.protocols, self.seed)
 
 

@@ -46,7 +46,7 @@ class MyRioParameters:
 
     @property
     def newton_per_volt(self) -> float:
-        """Scale of the load channel."""
+        """Scale of the load channel in N per V."""
         return self.load_full_scale_n / self.full_scale_v
 
 
@@ -82,7 +82,7 @@ class SimulatedMyRio:
         return self.convert(self.parameters.load_zero_v + load_n / self.parameters.newton_per_volt, self.load_error_v)
 
     def to_load_n(self, voltage_v: Array) -> Array:
-        """Load (n,) in N by the nominal scale."""
+        """Load (n,) in N from the logged voltage (n,), by the nominal scale."""
         return (voltage_v - self.parameters.load_zero_v) * self.parameters.newton_per_volt
 
 

@@ -45,7 +45,7 @@ class HdiParameters:
 
     @property
     def unloaded_v(self) -> float:
-        """The output at zero gauge pressure."""
+        """The output in volt at zero gauge pressure."""
         return LOW_V + 0.5 * SPAN_V if self.bidirectional else LOW_V
 
     @property
@@ -156,7 +156,7 @@ class SimulatedHdiSensor(Sensor):
         return share
 
     def to_pressure_pa(self, reading_v: Array) -> Array:
-        """Pressure (n,) in Pa by the nominal characteristic."""
+        """Pressure (n,) in Pa from the reading (n,) in volt, by the nominal characteristic."""
         p = self.parameters
         return (np.asarray(reading_v, dtype=float) - p.unloaded_v) * (p.range_pa / p.span_v)
 

@@ -15,7 +15,7 @@ WARPS = np.linspace(-LARGEST_WARP, LARGEST_WARP, 49)
 
 
 def smooth_step(share: Array) -> Array:
-    """From 0 to 1 while the share (n,) goes from 0 to 1, with slope and curvature zero at both ends."""
+    """Rises from 0 to 1 as the share (n,) does, with zero slope and curvature at both ends."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 

@@ -107,7 +107,7 @@ class Walk(Move):
 
     @property
     def stance_shares(self) -> tuple[float, float]:
-        """Above a half, so that both feet are on the ground twice a stride."""
+        """Above a half, so that both feet are on the ground twice per stride."""
         return 0.505, 0.85
 
     def cadence(self, person: Person) -> float:

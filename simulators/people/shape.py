@@ -43,7 +43,7 @@ RUNNING = {
 
 
 def pulse(stance: Array, begin: float, peak: float, end: float, rise: float, fall: float, height: float) -> Array:
-    """One region's load (n,) at the shares of stance (n,)."""
+    """One region's load (n,) in body weights at the shares of stance (n,): a pulse of the given times and exponents."""
     rises = stance < peak
     side = np.where(rises, (stance - begin) / (peak - begin), (end - stance) / (end - peak))
     return np.asarray(height * np.sin(0.5 * np.pi * np.clip(side, 0.0, 1.0)) ** (2.0 * np.where(rises, rise, fall)))

@@ -1,4 +1,4 @@
-"""Any shoe, simulated or replayed, at a pseudo-terminal, speaking as its firmware would.
+"""Emulates a shoe's firmware on a pseudo-terminal, for any simulated or replayed shoe.
 
     python -m simulators.wire.emulator sim:walk --link ./shoe0
 

@@ -94,7 +94,7 @@ class FaultyAir:
         return lost
 
     def pass_on(self, frames: Sequence[bytes]) -> Aired:
-        """What arrives of ``frames``, in order."""
+        """The bytes that arrive of ``frames``, in order, and which frames are intact."""
         count, faults, rng = len(frames), self.faults, self._rng
         if not count:
             return Aired(b"", np.zeros(0, dtype=bool))

@@ -17,7 +17,7 @@ from smartshoe.errors import DeviceError, UsageError
 
 
 class PtyLine:
-    """The device's end of a line whose other end is the port ``link``, a symbolic link to the pseudo-terminal."""
+    """The device's end of a serial line; the other end is the port ``link``, a symbolic link to the pseudo-terminal."""
 
     def __init__(self, link: Path | str) -> None:
         self.link = Path(link)
@@ -114,7 +114,7 @@ class PtyLine:
         return b""
 
     def wait_writable(self, wait_s: float) -> bool:
-        """Whether there is room for bytes, within ``wait_s``."""
+        """Whether bytes can be written within ``wait_s``."""
         import select
 
         if self._master is None:

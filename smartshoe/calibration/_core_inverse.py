@@ -9,7 +9,7 @@ from smartshoe.models.core import Core
 from smartshoe.models.effects.effect import CStep, Inverse
 
 RINGING = -0.5
-"""An eigenvalue of the inverse below this changes sign at each sample and dies slowly: noise would ring."""
+"""An eigenvalue of the inverse below this changes sign at each sample and decays slowly: noise would ring."""
 
 
 class CoreInverse(Inverse):

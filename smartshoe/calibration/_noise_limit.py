@@ -8,8 +8,8 @@ from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CStep, Inverse
 
 MOST = 3.0
-"""Times that a block may raise what alternates from sample to sample. Undoing a lag of T raises it 1 + 2 T/step times:
-without a bound, ever more as the sampling gets finer. For lags of 5 to 60 ms at 100 and 500 Hz and noise of 0.05 and
+"""Largest gain of a block for a signal that alternates from sample to sample. Undoing a lag T has 1 + 2 T/step,
+which without a bound grows as the sampling gets finer. For lags of 5 to 60 ms at 100 and 500 Hz and noise of 0.05 and
 0.1 % of full scale, 3 to 5 leave the least error of the force on the paper's triangles."""
 
 

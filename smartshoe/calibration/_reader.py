@@ -42,7 +42,10 @@ class Reader:
         return found[key]
 
     def number(self, found: Mapping[str, Any], key: str, above: str = "") -> float:
-        """The finite number under ``key``; ``above`` is the path of ``found`` in the file, with a full stop."""
+        """The finite number under ``key``.
+
+        ``above`` is the path of ``found`` in the file for messages, with a final full stop.
+        """
         value = self._get(found, key, above)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise self.fault(above + key, f"is {value!r}, not a finite number")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from smartshoe.recording import Recording
 
 RATE_DIGITS = 9
-"""Of a sampling rate, which is one over a step read from a file: 100 Hz, not 100.00000000000213."""
+"""Digits of a sampling rate, the reciprocal of a step read from a file: 100 Hz, not 100.00000000000213."""
 
 
 def without_rounding(rate_hz: float) -> float:

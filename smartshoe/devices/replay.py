@@ -1,4 +1,4 @@
-"""Recordings played back through the same calls as live devices, with their own time stamps."""
+"""Plays recordings back through the same calls as live devices, with the recorded time stamps."""
 
 from __future__ import annotations
 

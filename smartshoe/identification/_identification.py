@@ -82,7 +82,7 @@ class Identification(Summarised):
         }
 
     def predicted(self, recording: RecordingLike) -> Array:
-        """What the model says of a recording of this fit.
+        """The model's output for a recording of this fit.
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class Identification(Summarised):
         Raises
         ------
         UsageError
-            Where the fit did not use this recording, or ``recording`` is none.
+            Where the fit did not use this recording, or ``recording`` is not one.
         """
         name = self._name_of(recording)
         return self._measured[name][1] + self.errors[name]
@@ -133,7 +133,7 @@ class Identification(Summarised):
         }
 
     def plot(self) -> Figure:
-        """A figure: by recording, the measured signal with the model's, and below it measured minus model."""
+        """A figure: for each recording, the measured signal and the model's, and below them measured minus model."""
         figure, axes = panels(2 * len(self._measured), height=2.0)
         quantity = "load" if self.direction == "inverse" else "reading"
         for upper, lower, (name, (time_s, measured)) in zip(axes[::2], axes[1::2], self._measured.items(), strict=True):
@@ -180,7 +180,7 @@ class Identification(Summarised):
 
     @cached_property
     def fit_percent_by_recording(self) -> Mapping[str, float]:
-        """``fit_percent`` of each recording."""
+        """``fit_percent`` of each recording alone."""
         problem = self.fit.problem
         return {
             experiment.name: fit_percent(y[mask], problem.model_error(self.fit.theta, index)[mask])

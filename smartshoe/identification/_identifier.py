@@ -56,22 +56,22 @@ def identify(  # noqa: PLR0913 - a public verb
     recordings
         Experiments of the unit: recordings, paths or DataFrames.
     direction : {"inverse", "forward"}
-        Whose error is minimised: the load's, as in the paper, or the reading's. The parameters are those of equation
-        (13) either way.
+        Which signal's error is minimised: the load's, as in the paper, or the reading's. The parameters are those of
+        equation (13) in both cases.
     method : {"trf", "gn", "lm", "srivc"}
-        SRIVC alone, or from it one of the others, which share one residual and gradient.
+        SRIVC alone, or one of the others started from it, which share one residual and gradient.
     structure : {"free", "grey_box"}
         "free" fits a1, b0, b1; "grey_box" k1 and k2, with c = 1 and x_over_nrt as the paper has them unless ``fixed``
         names others.
     estimator : {"auto", "output_error", "errors_in_variables", "command", "cycles"}
-        "output_error" takes the input for exact; "errors_in_variables" knows noise on both; "command" and "cycles"
+        "output_error" takes the input as exact; "errors_in_variables" allows for noise on both; "command" and "cycles"
         take their instruments from the commanded load or from the mean of the other repeats; "auto" fits the first and
-        goes on to another where the input's noise would move the result by a tenth of its error bar, and says so.
+        then another where the input's noise would move the result by a tenth of its error bar, with a note.
     offset, delay, initial_state
-        Reading at no load (one a recording), s by which the reading is later than the load, and what was before:
-        estimated, or fixed.
+        Reading at no load (one per recording), time in s by which the reading is later than the load, and the state at
+        the first sample: estimated, or fixed.
     load_offset_n
-        The load cell's zero in N: one constant cannot be distinguished from the other, so that one of the two is fixed.
+        The load cell's zero in N. It cannot be distinguished from the reading's offset, so one of the two is fixed.
     fixed, bounds
         Parameters of the structure that are known, and limits of those that are free, by name.
     reading_noise, load_noise_n

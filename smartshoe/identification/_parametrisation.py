@@ -51,7 +51,7 @@ class FreeForm:
         return np.array([-30.0, -np.inf, -np.inf]), np.array([30.0, np.inf, np.inf])
 
     def shape(self, theta: Array) -> Shape:
-        """The response at ``theta``."""
+        """The response (alpha, p1, p2) at ``theta``, with its derivative."""
         return Shape(float(np.exp(theta[0])), float(theta[1]), float(theta[2]), SAME)
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
@@ -138,7 +138,7 @@ class GreyBox:
         return np.array(self._all(theta)[:3]), slope.reshape(3, len(names))
 
     def shape(self, theta: Array) -> Shape:
-        """The response at ``theta``."""
+        """The response (alpha, p1, p2) at ``theta``, with its derivative."""
         (a1, b0, b1), slope = self.coefficients(theta)
         static = b1 / a1
         static_slope = (slope[2] - static * slope[0]) / a1

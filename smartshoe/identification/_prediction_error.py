@@ -109,7 +109,7 @@ class PredictionError:
 
     # -- parameters ------------------------------------------------------------------------------------------
     def shape(self, theta: Array) -> Shape:
-        """The response at ``theta``."""
+        """The response (alpha, p1, p2) at ``theta``, with its derivative."""
         return self.form.shape(theta[: self.shape_size])
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:

@@ -58,7 +58,7 @@ def lack_of_fit(
     recordings
         Recordings, paths or DataFrames.
     skip_first
-        So many cycles of each recording are left out.
+        The number of cycles at the beginning of each recording that are left out.
 
     Raises
     ------

@@ -20,7 +20,7 @@ def _controller(with_scipy: bool) -> Any:
 
 
 def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
-    """Run ``function`` with the BLAS libraries held to one thread."""
+    """Decorate ``function`` to run with the BLAS libraries limited to one thread."""
 
     @wraps(function)
     def held(*args: P.args, **kwargs: P.kwargs) -> R:

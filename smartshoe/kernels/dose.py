@@ -11,7 +11,7 @@ from smartshoe.kernels.memory import NO_LOAD
 
 @njit(cache=True)
 def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out + set = ``signal`` (n,), set += half (out^m + last out^m) a step, out^m = 0 below zero.
+    """out (n,) with out + set = ``signal`` (n,); per step, set += half (out^m + last out^m), with out^m = 0 below zero.
 
     ``state`` (2,): set, last out^m (negative before the first sample).
     """

@@ -1,7 +1,7 @@
-"""State recursions of a linear filter: even steps by its exact matrices, uneven ones by the exponential's action.
+"""State recursions of a linear filter: even steps by exact matrices, uneven ones by the exponential's action.
 
-A state is laid out in two blocks of n, of which the second drives the first and never the other way:
-``[second-order chain, first-order chain]``; see `smartshoe.identification.transfer_function._discrete`.
+A state consists of two blocks of n, of which the second drives the first but not the other way round: ``[second-order
+chain, first-order chain]``; see `smartshoe.identification.transfer_function._discrete`.
 """
 
 from __future__ import annotations

@@ -10,10 +10,10 @@ from numba import njit
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
-    """out[k] = u at the place k - late[k], in samples; beyond the ends the end values hold.
+    """out[k] = u interpolated at k - late[k], in samples; beyond its ends u keeps its end values.
 
-    ``u``, ``late``, ``out`` (n,); ``weights`` (m + 1, 16) of the neighbours -7 ... 8 of a place at the fractions 0,
-    1/m, ... 1 past a sample, interpolated between two fractions. ``out`` is overwritten.
+    ``u``, ``late``, ``out`` (n,). ``weights`` (m + 1, 16) are those of the neighbours -7 ... 8 of a position at the
+    fractions 0, 1/m, ... 1 past a sample; they are interpolated between two fractions. ``out`` is overwritten.
     """
     n, fractions = u.size, weights.shape[0] - 1
     for k in range(n):

@@ -44,7 +44,7 @@ def push_tick(readings, forces_n, bank):  # type: ignore[no-untyped-def]
 
 @njit(f"void(float64[:, ::1], float64[:, ::1], {_BANK})", cache=True, error_model="numpy")
 def push_block(readings, forces_n, bank):  # type: ignore[no-untyped-def]
-    """Write the forces (ticks, units) of readings (ticks, units), time-major; shapes must agree."""
+    """Write the forces (ticks, units) of readings (ticks, units) of the same shape, tick by tick."""
     for tick in range(readings.shape[0]):
         for unit in range(readings.shape[1]):
             forces_n[tick, unit] = _step(readings[tick, unit], bank, unit)

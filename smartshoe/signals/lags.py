@@ -1,4 +1,4 @@
-"""A first-order lag of a sampled signal."""
+"""First-order lag of a sampled signal."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from smartshoe.arrays import Array, Index, Mask
 
 
 def runs_of(mask: Mask) -> tuple[Index, Index]:
-    """First samples and one-past-last samples of the runs of True in ``mask`` (n,)."""
+    """Start and end indices (end excluded) of the runs of True in ``mask`` (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return edges[0::2], edges[1::2]
 

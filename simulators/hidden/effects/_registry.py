@@ -145,15 +145,15 @@ def signed(more: Drawing = lambda rng, subject: {}) -> Drawing:
 
 
 def bladder(**given: Any) -> Options:
-    """Options of the bladder."""
+    """A machine's options that set these options of the bladder."""
     return {"bladder": given}
 
 
 def sensor(**given: Any) -> Options:
-    """Options of the sensor."""
+    """A machine's options that set these options of the sensor."""
     return {"sensor": given}
 
 
 def reading(**given: Any) -> Options:
-    """Options of the reading's channel in the logger."""
+    """A machine's options that set these options of the reading's channel in the logger."""
     return {"daq": {"reading": given}}

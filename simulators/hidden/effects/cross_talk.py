@@ -7,7 +7,7 @@ from simulators.hidden.effects._registry import Draws, Hideable, Options, Subjec
 
 
 def neighbour(amount: float, draws: Draws, subject: Subject) -> Options:
-    """A logged neighbour that couples by ``amount``."""
+    """Machine options with a logged neighbour whose coupling is ``amount``."""
     given = {"highest_mbar": subject.full_scale_mbar, "noise_mbar": 0.001 * subject.full_scale_mbar}
     coupling = {key: draws[key] for key in ("lag_s", "from_share") if key in draws}
     return {"neighbour": {"logged": True, "cross_talk": amount, "period_s": draws["period_s"], **given, **coupling}}

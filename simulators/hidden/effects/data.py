@@ -47,7 +47,7 @@ def under_load(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array
 
 
 def single_samples(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Lost packets of one sample: empty cells."""
+    """Lost packets of one sample each, which leave empty cells."""
     gone = at.rng.random(y.size) < amount
     gone[:1] = False
     return np.where(gone, np.nan, y)

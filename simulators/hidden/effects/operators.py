@@ -32,7 +32,7 @@ def against_modes(signal: Array, step_s: float, rate: Array, weight: Array) -> A
 
 @njit(cache=True)
 def modes(signal: Array, step_s: float, rate: Array, weight: Array, out: Array) -> None:
-    """Fill ``out`` (n,) with sum_j w_j (x - q_j)."""
+    """Fill ``out`` (n,) with sum_j w_j (x - q_j), q_j' = rate_j (x - q_j); the compiled part of `against_modes`."""
     keep = np.exp(-rate * step_s)
     mean = -np.expm1(-rate * step_s) / (rate * step_s)
     q = np.zeros(rate.size)
@@ -51,7 +51,7 @@ def modes(signal: Array, step_s: float, rate: Array, weight: Array, out: Array) 
 def norton(signal: Array, step_s: float, time_constant_s: float, scale: float, power: float, out: Array) -> None:
     """Fill ``out`` (n,) with s = x - q, q' = scale/tau |s/scale|^power sgn s: an arm whose dashpot is a power law.
 
-    Implicit in the stress's secant, so that it is stable at any step.
+    Implicit, with the secant of the stress, so that it is stable at any step.
     """
     q, before = 0.0, 0.0
     for i in range(signal.size):
@@ -88,7 +88,8 @@ def slip(signal: Array, up: Array, down: Array, weight: Array, out: Array) -> No
 def jiles_atherton(signal: Array, pin: float, scale: float, out: Array) -> None:
     """Fill ``out`` (n,) with the lag of m behind the anhysteretic a = tanh(x/scale): dm/dx = (a - m)/(pin sgn dx).
 
-    Never negative: where the anhysteretic lies on the far side the domains stay (Jiles and Atherton 1986, eq. 14).
+    The slope is never negative: where the anhysteretic lies on the other side, m does not change (Jiles and Atherton
+    1986, eq. 14).
     """
     m, before = 0.0, 0.0
     for i in range(signal.size):

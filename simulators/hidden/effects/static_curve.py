@@ -50,7 +50,7 @@ def adsorption(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array
 
 # -- wall --------------------------------------------------------------------------------------------------------------
 def eight_chains(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """Chains of limited length, inverse Langevin by Cohen's approximant."""
+    """A wall of chains with limited length: the inverse Langevin function by Cohen's approximant."""
     stretch = np.minimum(amount * x * x, LOCKING)
     return at.stiff / (1.0 + at.stiff) * x * ((3.0 - stretch) / (3.0 * (1.0 - stretch)) - 1.0)
 

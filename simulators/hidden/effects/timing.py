@@ -21,7 +21,7 @@ def cole_cole(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
 
 
 def widening(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A port that the pressure widens: faster at high pressure."""
+    """A port that the pressure widens, and which is therefore faster at high pressure."""
     out = np.empty(y.size)
     opening_port(np.ascontiguousarray(y), at.step_s, amount, draws["opening"], out)
     return out

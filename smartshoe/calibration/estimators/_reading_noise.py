@@ -1,4 +1,4 @@
-"""The noise of a reading, from the reading alone."""
+"""Estimates the noise of a reading from the reading alone."""
 
 from __future__ import annotations
 

@@ -28,11 +28,11 @@ from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import CStep
 
 FRACTION = 46
-"""Bits after the point of a share of full scale inside the chain."""
+"""Fractional bits of a share of full scale inside the chain."""
 FRACTION_WITH_TIME = 40  # leaves room for six days in seconds
 WIDEST = 64  # full scales that a signal may reach between two blocks
 RUN = 20_000
-"""Samples after the start for which the bound is stated: what is summed up drifts by its rounding."""
+"""Samples after the start for which the bound holds: running sums drift by their rounding."""
 ROUNDINGS_A_BLOCK = 200
 ROUNDINGS_A_SAMPLE = 4  # of a sum over the whole session
 MOVED = 24  # positions in the test readings at which a single reading is moved
@@ -40,7 +40,7 @@ WALK = 4000  # samples of a walk on which all readings are moved at once
 DRAWS = 6  # random choices of which readings move up and which down
 DITHER = 0.001  # standard deviation of noise added to these readings, of their span
 MARGIN = 2.0
-"""Of what was measured at these places, for the places that were not tried."""
+"""Factor on the measured error, for the positions that were not tried."""
 
 
 Forces = Callable[[Array], Array]

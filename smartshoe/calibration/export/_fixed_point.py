@@ -14,7 +14,7 @@ from smartshoe.errors import UsageError
 
 WIDTHS = {"q15": 15, "q31": 31}
 HEADROOM = {"q15": 1.25, "q31": 16.0}
-"""How far beyond the calibrated load the range goes at least: 16 bits have no step to spare, 32 bits have."""
+"""Least range over the calibrated load: 16 bits have no resolution to spare, 32 bits have."""
 PRODUCT_BITS = 62  # a product plus half the last bit kept stays within 64 bits
 LARGEST_SHIFT = 62
 WORST_SHARE = 0.01  # of the calibrated load: with a larger error bound the filter is refused

@@ -7,9 +7,9 @@ from collections.abc import Sequence, Set
 from fractions import Fraction
 
 MOST = 2**59
-"""No count is larger: four of them still add up within 64 bits."""
+"""Largest count, so that a sum of four stays within 64 bits."""
 REAL_FUNCTIONS = ("exp", "expm1", "log", "log1p", "pow", "sqrt", "tanh", "fabs", "fmax", "fmin")
-"""Functions of <math.h> that have an integer twin; all are called NAME_q, which no block calls its own."""
+"""Functions of <math.h> that have an integer twin, called NAME_q, a name that no block uses itself."""
 
 _LOGARITHM_TERMS = 9  # of an odd series in at most 0.2: the next is 0.2^19/19 = 3e-15
 _EXPONENTIAL_TERMS = 14  # of a series in at most 0.35: the next is 0.35^15/15! = 1e-19

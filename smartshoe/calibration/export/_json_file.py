@@ -53,7 +53,7 @@ def json_files(model: FilterModel) -> dict[str, str]:
 
 
 def _extended(model: ExtendedFilterModel) -> dict[str, Any]:
-    """The whole model, and its linear network's inverse at the sample rate."""
+    """The JSON object of the whole extended model, with the inverse of its linear network at the sample rate."""
     filter_ = model.filter
     core = filter_.core
     return {

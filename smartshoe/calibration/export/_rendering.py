@@ -47,7 +47,7 @@ def vector_csv(model: FilterModel) -> str:
 
 
 def columns_csv(model: FilterModel, columns: Mapping[str, NDArray[Any]]) -> str:
-    """CSV of ``columns`` (n,) each, with the provenance as comments, numbers in full precision."""
+    """CSV of ``columns``, (n,) each: the provenance as comments, then numbers in full precision."""
     lines = [f"# {key}: {text}" for key, text in model.provenance.items()]
     lines.append(",".join(columns))
     lines += [",".join(map(repr, row)) for row in zip(*(values.tolist() for values in columns.values()), strict=True)]

@@ -46,7 +46,7 @@ def control_system(calibration: Calibration, *, sample_rate_hz: float | None = N
 def _coefficients(
     calibration: Calibration, sample_rate_hz: float | None, continuous: bool
 ) -> tuple[list[float], list[float], float | None]:
-    """Numerator and denominator, highest power first, and the step in s (None: continuous)."""
+    """Numerator and denominator, highest power first, and the time step in s (None: continuous)."""
     if continuous:
         if sample_rate_hz is not None:
             raise UsageError("a continuous system has no sample_rate_hz: leave one of the two away")

@@ -1,4 +1,4 @@
-"""`CalibrationStore`: every calibration of every unit, and what happened to the units between them."""
+"""`CalibrationStore`: all calibrations of all units, and the events in the units' lives."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ class CalibrationStore:
         return found
 
     def position_of(self, serial_number: str, date: When) -> str:
-        """Where the unit sits at ``date``, '' where that is not known (or another unit took its place)."""
+        """The place of a unit at ``date``, '' where that is not known or another unit has taken the place."""
         at = moment(date)
         entries, events = self._read()
         placed = [e for e in events if e.kind == "placed" and e.date <= at]

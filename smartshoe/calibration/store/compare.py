@@ -98,7 +98,7 @@ class Comparison:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.comparison/1."""
+        """The comparison as a JSON object, schema smartshoe.comparison/1."""
         return {
             "schema": "smartshoe.comparison/1",
             "parameters": {item.name: item.to_dict() for item in self.parameters},

@@ -102,7 +102,7 @@ class Drift:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.drift/1."""
+        """The drift as a JSON object, schema smartshoe.drift/1."""
         return {
             "schema": "smartshoe.drift/1",
             "serial_number": self.serial_number,
@@ -159,7 +159,7 @@ class _TrendFit:
     scatter: float
 
     def parameter(self, contrast: Array, unit: str) -> Parameter:
-        """contrast @ theta with its interval (Student's t: the scatter between calibrations is itself estimated)."""
+        """contrast @ theta with its interval, by Student's t, since the scatter between calibrations is estimated."""
         from scipy.special import stdtrit
 
         value = float(contrast @ self.theta)

@@ -1,4 +1,4 @@
-"""`validate`: raw, statically scaled and compensated errors of a calibration on recordings."""
+"""`validate`: errors of a calibration on recordings, for the raw, the statically scaled and the compensated force."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Validation(Summarised):
     reading_unit: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema ``smartshoe.validation/1``."""
+        """The validation as a JSON object, schema ``smartshoe.validation/1``."""
         return {
             "schema": "smartshoe.validation/1",
             "unit": self.unit,
@@ -92,7 +92,7 @@ class Validation(Summarised):
         }
 
     def plot(self) -> Figure:
-        """A figure: by recording, the force with and without compensation over the reference load."""
+        """A figure with, for each recording, the force with and without compensation over the reference load."""
         figure, axes = panels(len(self.traces))
         for axis, trace in zip(axes, self.traces, strict=True):
             load_n = np.where(trace.valid, trace.load_n, np.nan)

@@ -20,7 +20,7 @@ def checksum(data: bytes) -> int:
 
 @cache
 def _tables(length: int) -> tuple[int, NDArray[np.uint16]]:
-    """The checksum of ``length`` zero bytes, and what each value (256) of each byte (length) adds to it."""
+    """The checksum of ``length`` zero bytes, and the contribution (length, 256) of each value of each byte to it."""
     base = checksum(bytes(length))
     tables = np.empty((length, 256), dtype=np.uint16)
     for position in range(length):

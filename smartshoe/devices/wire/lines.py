@@ -299,5 +299,5 @@ def _written(value: float, decimals: int) -> str:
 
 
 def encode_header(names: Iterable[str] = COLUMNS, separator: str = ",") -> bytes:
-    """The header line."""
+    """The header line with these column ``names``, including the newline."""
     return (separator.join(names) + "\n").encode("ascii")

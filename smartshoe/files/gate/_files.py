@@ -20,8 +20,8 @@ _KINDS = (
 def require_regular_file(path: Path, *, at_most: int | None = None) -> int:
     """The size in bytes of the regular file at ``path``.
 
-    Raises `InputError` where there is none, where it is a folder, pipe or device (which may never end), and where it
-    is larger than ``at_most`` (default: the limit ``file_bytes``).
+    Raises `InputError` where it does not exist, where it is a folder, pipe or device (which may never end), and where
+    it is larger than ``at_most`` (default: the limit ``file_bytes``).
     """
     if path.name == "-" and not path.exists():
         raise InputError(f"{path} is no file, and standard input cannot be read: write its content to a file first")
@@ -46,7 +46,7 @@ def require_regular_file(path: Path, *, at_most: int | None = None) -> int:
 
 
 def read_bytes(path: Path, *, at_most: int | None = None) -> bytes:
-    """The content of the regular file at ``path``; raises `InputError` as `require_regular_file` does."""
+    """The content of the regular file at ``path``; raises the errors of `require_regular_file`."""
     size = require_regular_file(path, at_most=at_most)
     try:
         with path.open("rb") as file:

@@ -34,7 +34,7 @@ def _head(path: Path) -> bytes:
 def detect(path: Path | str) -> Format:
     """The format of the file at ``path``.
 
-    Raises `InputError` where it cannot be read, `FormatError` where no format fits.
+    Raises `InputError` where it cannot be read, `FormatError` where it is in no known format.
     """
     path = Path(path)
     head = _head(path)
@@ -80,15 +80,15 @@ def read(
     Parameters
     ----------
     path
-        The file, in any of the formats; its content says which, before its suffix does.
+        The file, in any of the formats; recognised by its content, then by its suffix.
     time, force, sensors
-        Columns, where names and units do not tell: ``NAME``, ``NAME[unit]`` or, by 1-based number, ``3`` and
+        Columns, where names and units are ambiguous: ``NAME``, ``NAME[unit]`` or, by 1-based number, ``3`` and
         ``3[bar]``; the time also ``rows[49Hz]``, or ``NAME[49Hz]`` for a column that counts samples at that rate. A
         reference that is a pressure is taken for the force on 1 cm².
     unit, name
-        The sensing unit (``left_toe``) and the recording's name, in place of what the file says.
+        The sensing unit (``left_toe``) and the recording's name, instead of those in the file.
     partly
-        The file is one of two logs: choices that name no column of it are passed over.
+        The file is one of two logs: choices that name none of its columns are ignored.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def write(recording: Recording, path: Path | str) -> None:
     Parameters
     ----------
     recording
-        What is written; numbers as they are, with their units in the columns' names.
+        The recording; numbers are written unchanged, with their units in the columns' names.
     path
         ``.csv`` and ``.txt`` are the plain table.
 

@@ -84,7 +84,7 @@ class _NumberTable:
         return sorted(found)[:limit]
 
     def decimal(self) -> str:
-        """The one decimal mark of the file; raises `FormatError` where cells contradict each other."""
+        """The file's only decimal mark; raises `FormatError` where cells contradict each other."""
         if not any("," in text for text in self.joined):
             return "."
         if not any("." in text for text in self.joined):

@@ -124,7 +124,7 @@ def even_rows(path: Path, rows: list[list[str]], lines: Sequence[int], width: in
 
 
 def bracketed(title: str) -> tuple[str, str]:
-    """A title as name and unit's text: ``Time[s]``, ``Force (N)``, ``Force, N``; the whole title and '' without one."""
+    """A title as name and unit's text: ``Time[s]``, ``Force (N)``, ``Force, N``; without a unit the title and ''."""
     match = _BRACKETED.fullmatch(title)
     if match and match[1]:
         return match[1], match[2].strip()

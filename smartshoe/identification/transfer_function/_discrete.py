@@ -1,7 +1,7 @@
 """1/A(s) and 1/A(s)^2 between samples, exactly: steps or straight lines, any delay, even or uneven steps.
 
 The chain is ``A(p) x = u``, ``A(p) w = x`` with p = d/dt; its states are x, w and their first n - 1 derivatives. From
-them everything follows without a numerical derivative: the model's output, its derivatives with respect to every
+them everything follows without numerical differentiation: the model's output, its derivatives with respect to every
 coefficient (`StateVariableFilter.numerator_map`, `StateVariableFilter.denominator_map`), and the filtered derivatives
 that SRIVC needs. The transition over a step is a block of the exponential of the system with its input as further
 states (Van Loan 1978).

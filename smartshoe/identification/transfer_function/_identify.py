@@ -71,18 +71,18 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
     poles, zeros
         Degrees of A and B.
     sample_time_s, time_s
-        When they were taken: the one, or the other (n,) with any steps.
+        The even sampling step in s, or instead the times (n,) in s, with any steps.
     method : {"trf", "gn", "lm", "srivc"}
-        SRIVC alone, or from it one of the others, which share one output error and analytic gradient.
+        SRIVC alone, or one of the others started from it, which share one output error and analytic gradient.
     intersample : {"zoh", "foh"}
-        Whether the input is held or straight between samples.
+        Whether the input is constant or linear between samples.
     prefilter_rad_s
         The lambda of SRIVC's first filter, about the bandwidth; by default several are tried.
     delay_s, max_delay_s
         A number or "estimate", from 0 up to ``max_delay_s`` (by default a quarter of the shortest experiment, 500
         samples at most).
     initial_state : {"estimate", "rest", "steady"}
-        "rest": input and output were 0 before; "steady": the first input had always been.
+        "rest": input and output were 0 before; "steady": the first input had lasted forever.
     offset
         Of the output, in y's unit: "estimate", one for each experiment, or a number.
     tolerance, max_iterations, strict
@@ -162,7 +162,7 @@ class _StructureFit:
         self.experiments, self.structure, self.options = experiments, structure, options
 
     def problem(self, *, delayed: bool, delay_s: float = 0.0, most_delay_s: float | None = None) -> OutputError:
-        """The output error with this structure."""
+        """The output error of this data set with this structure, with the delay fixed or a parameter (``delayed``)."""
         return OutputError(
             self.experiments, self.structure, delayed=delayed, delay_s=delay_s, most_delay_s=most_delay_s
         )
@@ -332,7 +332,7 @@ class _StructureFit:
         return best, [f"SRIVC did not settle from the prefilter given, it did from {prefilter:g} rad/s"]
 
     def srivc(self, problem: OutputError, theta: Array, max_iterations: int) -> Settled:
-        """SRIVC from ``theta`` with the user's tolerance."""
+        """The result of SRIVC from ``theta`` with the user's tolerance."""
         return srivc(problem, theta, tolerance=self.options.tolerance, max_iterations=max_iterations)
 
     def finish(

@@ -73,7 +73,7 @@ def select_order(
     poles, zeros
         The degrees to try.
     criterion
-        By which structures are ordered.
+        The criterion by which structures are ordered.
     held_out_share
         Several experiments are left out one at a time; of a single one, this share at its end. What is left out keeps
         its own offset and initial state, as every experiment does, and its error counts the freedom that they take.

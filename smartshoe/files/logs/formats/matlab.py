@@ -1,4 +1,4 @@
-"""MATLAB MAT-files: level 5 to 7 by scipy, 7.3 (HDF5) by h5py. Nothing is ever unpickled."""
+"""MATLAB MAT-files: level 5 to 7 by scipy, 7.3 (HDF5) by h5py. No object is unpickled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""XDF files of the Lab Streaming Layer's recorder, by pyxdf: one numeric stream with its channels' names and units."""
+"""XDF files recorded by the Lab Streaming Layer, read by pyxdf: one numeric stream with channel names and units."""
 
 from __future__ import annotations
 
