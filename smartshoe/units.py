@@ -63,7 +63,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("nN", "nanonewton", "force", 1e-9, 0.0, ()),
     ("MN", "meganewton", "force", 1e6, 0.0, ()),
     ("daN", "dan", "force", 10.0, 0.0, ()),
-    ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # of a load cell that reads mass
+    ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # a load cell may be scaled in units of mass
     ("gf", "gf", "force", 9.80665e-3, 0.0, ()),
     ("lbf", "lbf", "force", 4.4482216152605, 0.0, ("lb", "lbs")),
     ("Pa", "pa", "pressure", 1.0, 0.0, ("pascal", "帕")),

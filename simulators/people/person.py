@@ -172,4 +172,4 @@ class Tiptoe:
 
 
 Activity = Walk | Run | Stand | Tiptoe
-Part = tuple[Activity, float]  # and its duration in s
+Part = tuple[Activity, float]  # an activity and its duration in s

@@ -71,7 +71,7 @@ def relays_up(load: float, turning: Array, partial: Array, count: int, shape: Ar
         return partial[count - 1], count
     rising = load > last
     is_maximum = (count - 1) % 2 == 1
-    if count == 1 or rising != is_maximum:  # a reversal: the last point stays, a new one begins
+    if count == 1 or rising != is_maximum:  # a reversal: the last point is kept and a new one added
         if count >= MEMORY - 1:
             count -= 2
         count += 1

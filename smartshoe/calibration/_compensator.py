@@ -58,7 +58,7 @@ class Compensator(ForceFilter):
         return [float(n0), float(n1), float(self.denominator[1]), self._static_gain, self.offset, 0.0, np.nan, 0.0]
 
     def _begin(self, first: float) -> None:
-        # y = n0 u + state: the state that makes the first output the static gain's.
+        # With y = n0 u + state, this state makes the first output that of the static gain.
         self._state = np.array([(self._static_gain - self.numerator[0]) * (first - self.offset)])
 
     def _advance(self, readings: Array, count: int) -> Array:

@@ -105,7 +105,7 @@ class ExtendedCompensator(ForceFilter):
 
     def _undo_core(self) -> None:
         self._blocks.append(("core", self.core))
-        self._noise *= 1.0 + max(self.model.relaxing_share, 0.0)  # what a sudden load reads less than a held one
+        self._noise *= 1.0 + max(self.model.relaxing_share, 0.0)  # a sudden load reads less than a held one by this
         if not self.core.is_exact:
             self._cautions["baseline"] = (
                 f"{self.sample_rate_hz:g} Hz is coarse for this relaxation: the bilinear transform stands in for the"

@@ -208,7 +208,7 @@ class Shoe(Device):
 class TestMachine(Device):
     """A machine that presses one sensing unit and logs load and reading."""
 
-    __test__ = False  # not a test class, whatever pytest makes of the name
+    __test__ = False  # tells pytest that this is not a test class, despite its name
 
     @property
     @abstractmethod

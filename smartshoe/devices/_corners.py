@@ -17,7 +17,7 @@ from smartshoe.arrays import Array
 
 SLOPE_OVER_S = 0.15
 APART_S = 0.3
-LEAST_JUMP = 0.03  # of the largest
+LEAST_JUMP = 0.03  # of the largest jump of the slope
 LONGEST_SIDE_S = 2.0
 SHORTEST_SIDE_S = 0.15
 SHARE_OF_GAP = 0.9

@@ -38,7 +38,7 @@ def _offered() -> dict[str, EntryPoint]:
 
     Cached, since scanning the installed packages takes as long as a simulation.
     """
-    # From Python 3.12 on, entry points are taken by name and not by place, so that they cannot be reversed themselves.
+    # From Python 3.12 on, entry points are indexed by name rather than position, so that they cannot be reversed.
     return {entry.name: entry for entry in reversed(tuple(entry_points(group=GROUP)))}
 
 

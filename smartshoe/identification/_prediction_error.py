@@ -201,7 +201,7 @@ class PredictionError:
         self._delayed = (delay_s, found)
         return found
 
-    # -- the error, in one pass --------------------------------------------------------------------------------
+    # -- the error in one compiled pass ------------------------------------------------------------------------
     def evaluate(self, theta: Array) -> Evaluation:
         """Cost, gradient and normal matrix at ``theta``, without storing the residual."""
         if self.settings.noise_ratio:
@@ -283,7 +283,7 @@ class PredictionError:
         products: Array = self.settings.noise_ratio * from_input @ from_input.T + from_output @ from_output.T
         return products
 
-    # -- the error, stored -------------------------------------------------------------------------------------
+    # -- the stored error --------------------------------------------------------------------------------------
     def residual(self, theta: Array) -> Array:
         """(m,) model minus measured at the counted samples, in output units; whitened where that is enabled."""
         return self.residual_and_jacobian(theta)[0]

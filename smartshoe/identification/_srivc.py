@@ -147,6 +147,6 @@ def coarse_delay(problem: PredictionError, pole: float) -> float:
     if grid_s == 0.0 or costs.min() >= 0.5 * costs[reach]:
         return 0.0
     best = int(np.argmin(costs)) - reach
-    # In the inverse direction the input is shifted forwards to undo the reading's delay.
+    # In the inverse direction the input, a reading, is shifted forwards to compensate its delay.
     sign = 1.0 if problem.settings.direction == "inverse" else -1.0
     return sign * best * grid_s

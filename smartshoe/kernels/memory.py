@@ -17,7 +17,7 @@ SOLVED = 1e-14  # of full scale: tolerated residual of an inverse's equation
 STEPS, CLOSE = 60, 1e-9  # of Newton's and similar methods; after a smaller Newton step the error is about its square
 EASED = 1e-3  # of the width within which the corner of a root is rounded
 NO_LOAD = 1e30  # marks that there was no load yet
-CYCLE_ENDS = 0.05  # of the cycle's height
+CYCLE_ENDS = 0.05  # of the cycle's height, above its trough
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ from numba import njit
 
 from smartshoe.kernels.first_order import CHUNK, COLUMNS, add_products, hold, leave_out, recur
 
-INSTRUMENT, REGRESSOR, TARGET = 0, 5, 6  # columns; 1 to 4 are instruments and regressors both
+INSTRUMENT, REGRESSOR, TARGET = 0, 5, 6  # columns; 1 to 4 are both instruments and regressors
 _LAX = {"reassoc", "contract", "nsz"}
 
 

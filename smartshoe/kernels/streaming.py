@@ -22,7 +22,7 @@ def _step(reading, bank, unit):  # type: ignore[no-untyped-def]
         if np.isnan(reading):
             return 0.0
     elif np.isnan(bank[6, unit]):
-        # y = n0 u + state: the state that makes the first output the static gain's.
+        # With y = n0 u + state, this state makes the first output that of the static gain.
         bank[5, unit] = (bank[3, unit] - bank[0, unit]) * (reading - bank[4, unit])
     bank[6, unit] = reading
     u = reading - bank[4, unit]

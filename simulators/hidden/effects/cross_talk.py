@@ -17,7 +17,7 @@ EFFECTS = [
     Hideable("cross_talk", "cross_talk", "sensor", "cross_talk", "1", 0.01, 1.0, neighbour,
         uniform(period_s=(2.0, 5.0)), law="proportional",
         says="a share of the neighbour's pressure", source="common supply",
-        catalogue=lambda a, d, s, hz: {"coupling_mbar": a * s.full_scale_mbar},  # at the neighbour's largest
+        catalogue=lambda a, d, s, hz: {"coupling_mbar": a * s.full_scale_mbar},  # at the neighbour's largest pressure
         laws=(
             Law.of_options("lagged", "through a lag: along the insole", "first order", neighbour, 0.01, 1.0,
                            uniform(period_s=(2.0, 5.0), lag_s=(0.1, 0.5))),

@@ -17,7 +17,7 @@ def floor_of_bits(amount: float, draws: Draws, y: Array, at: Surroundings) -> Ar
 def companding(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
     """Steps that grow with the reading, as in telephony's logarithmic code; ``amount`` is the step at full scale."""
     mu = draws["mu"]
-    step = amount / (1.0 + mu) * mu / np.log1p(mu) * np.log1p(mu)  # of ln(1 + mu y)
+    step = amount / (1.0 + mu) * mu / np.log1p(mu) * np.log1p(mu)  # step of ln(1 + mu y)
     code = np.sign(y) * np.log1p(mu * np.abs(y))
     return np.asarray(np.sign(code) * np.expm1(np.abs(np.rint(code / step) * step)) / mu)
 

@@ -115,7 +115,7 @@ class KalmanRun(ForceRun):
         means, covariances = self._held
         count = max(len(means) - waiting, 0)
         if self._lag is not None and count:
-            # filterpy steps back with the transition of each sample: the same one everywhere.
+            # filterpy's smoother takes the transition of each sample, which is the same for all.
             means, covariances, _, _ = self._filter.rts_smoother(means, covariances)
         self._held = (self._held[0][count:], self._held[1][count:])
         look = ahead(self._calibration)

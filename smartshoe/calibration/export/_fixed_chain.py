@@ -97,7 +97,7 @@ class IntegerChain:
 def _in_integers(to: IntegerC, name: str, step: CStep) -> CStep:
     try:
         return to.step(step)
-    except ValueError as error:  # of an effect from another package
+    except ValueError as error:  # raised for the code of an effect from another package
         raise UsageError(
             f"block {name} is written in C that has no integer form ({error}): export in --precision double"
         ) from error

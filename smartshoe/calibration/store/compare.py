@@ -223,7 +223,7 @@ def _extended(first: Calibration, second: Calibration, time_s: Array, load_n: Ar
     """The force difference (n,) where either has effects: the first's reading passed through both filters."""
     bare = [_without_zero(calibration) for calibration in (first, second)]
     model = bare[0].model()
-    step_s = float(time_s[1])  # from 0
+    step_s = float(time_s[1])  # the first time is 0
     reading = model.reading(Conditions(time_s, load_n / model.full_scale_load_n, step_s))
     ours, theirs = (calibration.compensator(1.0 / step_s).apply(reading) for calibration in bare)
     return np.asarray(theirs - ours)

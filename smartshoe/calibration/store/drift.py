@@ -144,7 +144,7 @@ def _followed(calibrations: Sequence[Calibration]) -> list[tuple[str, str, Array
         if all(name in other for other in every):
             values = np.array([other[name].value for other in every])
             sds = np.array([other[name].sd for other in every])
-            if np.ptp(values) > 0.0 or np.any(sds > 0.0):  # c = 1, fixed in all of them, does not drift
+            if np.ptp(values) > 0.0 or np.any(sds > 0.0):  # c = 1, fixed in all calibrations, does not drift
                 found.append((name, first.unit, values, sds))
     return found
 

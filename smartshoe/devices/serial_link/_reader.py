@@ -21,7 +21,7 @@ from smartshoe.devices.serial_link.reconnect import Backoff
 from smartshoe.devices.wire.samples import Samples, join_samples
 from smartshoe.errors import DeviceError, DeviceTimeoutError
 
-# Reading waits 50 ms, writing 500 ms; only an operating system that hangs in opening a port takes longer.
+# Reading waits 50 ms, writing 500 ms; only an operating system that hangs while opening a port takes longer.
 JOIN_S = 2.0
 MOST_DOUBLINGS = 3
 PAUSE_SAMPLES = 5.0
@@ -61,7 +61,7 @@ class SerialReader:
         self._opened_s = self._valid_s = clock()
         said = greeting.information
         self._serial_number = None if said is None else said.serial_number
-        self._openings = 0  # since the last valid frame
+        self._openings = 0  # of the port, since the last valid frame
         self._is_silent = self._is_away = False
         self._reason = "silent"
         # In one call: the period of text lines, which reveals lost ones, is measured over all of them.

@@ -239,7 +239,7 @@ class _SerialProvider:
             raise UsageError("serial: has no port: write it like serial:///dev/rfcomm0 or serial://COM5")
         settings = settings_from(target, options or {})
         if settings.format != "frames":
-            _columns_of(settings)  # raises
+            _columns_of(settings)  # raises where no column is the time
         return SerialShoe(target, settings)
 
 

@@ -38,7 +38,7 @@ Level = Literal["least", "tenth", "median", "likely"]
 
 LEVELS: tuple[Level, ...] = ("least", "tenth", "median")
 BIN_S = 0.25
-KEPT_BINS = 2400  # ten minutes
+KEPT_BINS = 2400  # ten minutes of bins
 MOST_SAMPLES = 150_000  # used for the likely line
 FEW_BINS = 8
 LAW_FROM_BINS = 20

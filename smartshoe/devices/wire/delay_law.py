@@ -105,7 +105,7 @@ class DelayLaw:
             place = (np.clip((rest - self._first_s) / self._width_s, -1.0, CELLS) + row).astype(np.intp)
             score, curvature = self._score[place], self._curvature[place]
             gradient = np.array([score.sum(), (lever * score).sum()]) - prior @ [0.0, slope]
-            # Minus the second derivative: the score falls as the line rises.
+            # Minus the second derivative, since the score decreases as the line rises.
             information = prior + _moments(curvature, lever)
             if information[0, 0] <= 0.0 or np.linalg.det(information) <= 0.0:
                 information = prior + _moments(score**2, lever)
@@ -122,7 +122,7 @@ class DelayLaw:
         sums = np.column_stack([np.bincount(group, score, count), np.bincount(group, lever * score, count)])
         inverse = np.linalg.inv(information)
         covariance = inverse @ (sums.T @ sums * (of_few(free) ** 2 * count / free) + prior) @ inverse
-        # Where offset and slope are independent.
+        # The time at which offset and slope are independent.
         shift = -float(covariance[0, 1] / covariance[1, 1])
         offset_sd = math.sqrt(max(float(covariance[0, 0] + shift * covariance[0, 1]), 0.0))
         return DelayLine(about + shift, offset + slope * shift, offset_sd, slope, math.sqrt(float(covariance[1, 1])))

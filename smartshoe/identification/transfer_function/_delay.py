@@ -12,7 +12,7 @@ from smartshoe.identification.transfer_function._problem import OutputError
 MOST_SAMPLES = 500
 MOST_SHARE = 0.25  # of the shortest experiment's duration
 UNEVEN_POINTS = 40
-CANDIDATES = 3  # from each prefilter
+CANDIDATES = 3  # delays from each prefilter
 MARGIN = 1e-8  # steps by which a cell's lower end lies above the whole sample
 
 
