@@ -30,8 +30,8 @@ POLES = (1.0, 1.3)  # times the unit's own rate: a small change of the baseline 
 class HiddenLaw:
     """One hidden effect: its law, its strength, and how far it departs from the law's plain form.
 
-    ``departure`` is the residual of the law without its warp and a baseline, as a share of its own size; None where the
-    law has no warp.
+    ``departure`` is the residual after fitting the law without its warp, and a baseline, as a share of the law's own
+    size; None where the law has no warp.
     """
 
     effect: Hideable
@@ -300,7 +300,7 @@ def _pressed(p: Plan, options: Options, chain: Chain, subject: Subject, protocol
 
 
 def _departure(p, effect, placed, amount, size, subject, protocol, logger) -> float:  # type: ignore[no-untyped-def]
-    """The residual between the law with and without its warp, at any amount, as a share of the law's own size."""
+    """The law's residual after fitting it without its warp, at any amount, as a share of its own size."""
     made = []
     for options, chain in (placed(amount, size), placed(amount, 0.0), ({}, Chain())):
         given = merged(subject.options(), logger, options, SILENT)

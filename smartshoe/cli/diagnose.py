@@ -216,7 +216,7 @@ def _used(
 ) -> tuple[list[Recording], list[Recording]]:
     """The recordings that were fitted and those that judged, without excluded ones.
 
-    All if the diagnosis was refused.
+    All recordings where the diagnosis was refused.
     """
     if not found.traces:
         return recordings, others

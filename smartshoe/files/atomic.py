@@ -87,9 +87,9 @@ def _unwritable(path: Path | str, error: Exception) -> UsageError:
 
 
 def _place(path: Path) -> tuple[Path | int, bool]:
-    """Where content for ``path`` goes: a path with links resolved, or an open descriptor.
+    """Where content for ``path`` goes, and whether it is streamed there.
 
-    And whether it is streamed.
+    The place is a path with links resolved, or an open descriptor.
     """
     for _ in range(_MOST_LINKS):
         descriptor = _DESCRIPTOR.fullmatch(os.path.normpath(Path.cwd() / path))

@@ -154,7 +154,7 @@ def _function(fit: ParameterFit, choice: Choice, index: int) -> Function:
 def solid_of(coefficients: Array, newtons: float | None) -> tuple[Array, Array, float]:
     """(k1, k2, c), their Jacobian (3, 3) over (a1, b0, b1), and the scale.
 
-    Newtons None: c = 1 and the scale is free.
+    Where ``newtons`` (N per reading unit) is None, c is 1 and the scale is free.
     """
     a1, b0, b1 = (float(value) for value in coefficients)
     static = b1 / a1

@@ -220,10 +220,7 @@ def masked(signal: Array, mask: Mask) -> Array:
 
 
 def _largest_rises(signal: Array) -> tuple[float, float]:
-    """The largest rise and the largest fall from an earlier sample.
-
-    Of means of a few samples where there are thousands.
-    """
+    """The largest rise and the largest fall from an earlier sample, or of means of a few samples in long signals."""
     few = max(signal.size // 2000, 1)
     coarse = block_means(signal, few) if few > 1 else signal
     return (

@@ -159,10 +159,7 @@ class PredictionError:
         ]
 
     def coarse(self, most: int) -> PredictionError:
-        """This problem on means of neighbouring samples, reduced to about ``most``.
-
-        Itself where it is small already.
-        """
+        """This problem on means of neighbouring samples, about ``most`` of them; itself where it is small already."""
         total = sum(experiment.time_s.size for experiment in self.experiments)
         step_s = max(experiment.sample_time_s for experiment in self.experiments)
         factor = min(max(total // most, 1), max(int(COARSEST_STEP_S / step_s), 1))

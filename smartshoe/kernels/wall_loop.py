@@ -22,7 +22,7 @@ STEPS = 30
 def inflection(cubic, fifth):  # type: ignore[no-untyped-def]
     """u at which (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth) is steepest, and its slope.
 
-    Infinity and 0 if nowhere.
+    Infinity and 0 where there is no such u.
     """
     if fifth >= 0.0:
         return math.inf, 0.0

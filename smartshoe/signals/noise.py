@@ -74,10 +74,7 @@ def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None, ste
 
 
 def autocovariance(rows: Array) -> Array:
-    """(n,) sums of products of a series (n,) with itself at the lags 0 ...
-
-    n - 1; for rows (m, n) summed over the rows.
-    """
+    """(n,) sums of products of a series (n,) with itself at lags 0 to n - 1; for rows (m, n) summed over the rows."""
     n = rows.shape[-1]
     power = np.abs(np.fft.rfft(np.atleast_2d(rows), 2 * n, axis=1)) ** 2
     return np.asarray(np.fft.irfft(np.sum(power, axis=0), 2 * n)[:n])

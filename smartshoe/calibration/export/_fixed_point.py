@@ -33,7 +33,7 @@ class Scaled:
     def of(cls, value: Fraction, largest: int) -> Scaled | None:
         """``value`` with as many bits as a product with an integer up to ``largest`` allows.
 
-        None where none are left.
+        None if no bits are left.
         """
         bits: int = PRODUCT_BITS - largest.bit_length()
         size = abs(value)

@@ -26,10 +26,7 @@ def best_static(reading: Array, load_n: Array) -> tuple[float, float]:
 
 
 def loop_area(load_n: Array, estimate_n: Array) -> float:
-    """Area in N^2 enclosed by the closed path (load, estimate), by the shoelace formula.
-
-    Positive in either direction.
-    """
+    """Area in N^2 enclosed by the closed path (load, estimate), by the shoelace formula; never negative."""
     return float(0.5 * abs(np.dot(load_n, np.roll(estimate_n, -1)) - np.dot(estimate_n, np.roll(load_n, -1))))
 
 

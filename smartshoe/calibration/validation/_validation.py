@@ -220,7 +220,7 @@ def _judge(
 ) -> RateResult:
     """Errors over ``whole`` records where given, else over the given cycles.
 
-    Loop figures over the cycles in either case.
+    The figures of loops are over the cycles in either case.
     """
     spans = [(t, slice(None)) for t in whole] or [(t, slice(c.start, c.stop)) for t, c in found]
 

@@ -194,7 +194,7 @@ class SerialReader:
     def _recover(self, reason: str) -> None:
         """Close the port fully and reopen it.
 
-        Returns when it is open or the reader is closing, raises at the time limit.
+        Returns when it is open or the reader is closing; raises `DeviceTimeoutError` at the time limit.
         """
         self._let_go()
         if not self._is_away:

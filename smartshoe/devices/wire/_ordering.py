@@ -264,7 +264,7 @@ class _Placing:
     def _settle_before(self, frame: _Frame) -> bool:
         """Give out the held row if it lies between the last one and ``frame``, else drop it.
 
-        Whether the period changed.
+        Returns whether the period changed.
         """
         state, held, row = self._state, self._state._held, self._held_row
         if held is None or row is None or state._last is None:

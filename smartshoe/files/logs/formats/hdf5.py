@@ -68,7 +68,7 @@ def _text(value: Any) -> str:
 def write(recording: Recording, path: Path) -> None:
     """Write dimension and coordinate ``time`` in s, and a variable per channel with ``units`` and ``role``.
 
-    NaN where missing.
+    Missing samples are NaN.
     """
     import h5netcdf
 
