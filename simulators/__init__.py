@@ -1,4 +1,4 @@
-"""Truths for smartshoe: bladders, instruments, machines and shoes simulated from physics.
+"""Physical simulations of bladders, instruments, machines and shoes, whose truth is known to tests of smartshoe.
 
-They are richer than any model that smartshoe fits, and share no equation's code with it.
+They are richer than any model that smartshoe fits, and share no code for equations with it.
 """

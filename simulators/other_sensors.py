@@ -1,7 +1,8 @@
-"""Force sensors that are no pneumatic shoe's, by textbook physics, pressed as hands, robots and walkers press them.
+"""Force sensors other than a pneumatic shoe, by textbook physics, pressed as by hands, robots and walkers.
 
-What an engineer may bring whom nobody here knows. Each is an equation or two of its own kind of sensor, with noise, and
-says which families of the catalogue a standard linear solid of it lacks. *Left out:* everything else of the sensor.
+They stand for sensors unknown to smartshoe's authors. Each is an equation or two of its own kind of sensor, with noise,
+and lists the families of the catalogue that a standard linear solid of it lacks. *Left out:* everything else of the
+sensor.
 
 Sources: contacts that grow with load (Holm 1967), polymers that creep by powers of time (Findley 1976), hysteresis by
 relays (Mayergoyz 1991), bridges and their creep (OIML R 60), piezoelectric discharge and optical loss (Fraden 2016),
@@ -27,7 +28,7 @@ ROOM_C = 20.0
 
 @dataclass(frozen=True)
 class LoadHistory:
-    """One recording's load (n,) in N at ``time_s`` (n,), the ``number``-th of its unit; ``rng`` for what is random."""
+    """One recording's load (n,) in N at ``time_s`` (n,), the ``number``-th of its unit; ``rng`` for random parts."""
 
     time_s: Array
     load_n: Array
@@ -36,21 +37,21 @@ class LoadHistory:
 
     @property
     def rate_hz(self) -> float:
-        """Samples a second."""
+        """Samples per second."""
         return 1.0 / float(self.time_s[1] - self.time_s[0])
 
     def late(self, signal: Array, tau_s: float) -> Array:
-        """(n,) a first-order lag of it, in steady state at first."""
+        """``signal`` (n,) through a first-order lag, starting in steady state."""
         keep = float(np.exp(-1.0 / (self.rate_hz * tau_s)))
         return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal - signal[0]) + signal[0])
 
     def crept(self, signal: Array, taus_s: ArrayLike, weights: ArrayLike | None = None) -> Array:
-        """(n,) mean of its lags, weighed."""
+        """Weighted mean (n,) of ``signal`` through several first-order lags."""
         lags = [self.late(signal, float(tau)) for tau in np.asarray(taus_s)]
         return np.asarray(np.average(lags, axis=0, weights=weights))
 
     def noise(self, sd: float, memory: float = 0.6) -> Array:
-        """(n,) noise of a standard deviation, each sample with some ``memory`` of the one before."""
+        """Noise (n,) of standard deviation ``sd``; ``memory`` is the correlation of neighbouring samples."""
         white = self.rng.normal(0.0, sd * np.sqrt(1.0 - memory**2), self.time_s.size)
         return np.asarray(lfilter([1.0], [1.0, -memory], white))
 
@@ -68,7 +69,7 @@ def presses(
     rest_s: tuple[float, float] = (0.5, 3.0),
     lowest_n: float = 0.0,
 ) -> Load:
-    """Presses of random height, speed and length, none alike."""
+    """Presses of random height, speed and length, no two alike."""
 
     def made(rng: Generator, number: int) -> tuple[Array, Array]:
         time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
@@ -78,7 +79,7 @@ def presses(
             for lasts, level in ((ramp_s, peak), (hold_s, peak), (ramp_s, lowest_n), (rest_s, lowest_n)):
                 corners.append((corners[-1][0] + rng.uniform(*lasts), level))
         load = np.interp(time_s, *np.transpose(corners))
-        width = max(3, int(0.05 * rate_hz))  # no robot turns a corner at once
+        width = max(3, int(0.05 * rate_hz))  # no robot changes its speed instantly
         padded = np.pad(load, width, mode="edge")
         return time_s, np.convolve(padded, np.full(width, 1.0 / width), "same")[width:-width]
 
@@ -86,7 +87,7 @@ def presses(
 
 
 def one_press(rng: Generator, number: int) -> tuple[Array, Array]:
-    """A rest, one press at a rate that changes from recording to recording, a rest."""
+    """A rest, one press whose rate changes from recording to recording, and a rest."""
     ramp_s, peak = (0.2, 0.5, 1.0, 2.0)[number % 4], rng.uniform(10.0, 40.0)
     time_s = np.arange(0.0, 8.0, 0.01)
     corners_s = [0.0, 1.0, 1.0 + ramp_s, 2.5 + ramp_s, 2.5 + 2 * ramp_s, 8.0]
@@ -94,14 +95,14 @@ def one_press(rng: Generator, number: int) -> tuple[Array, Array]:
 
 
 def stretch(rng: Generator, number: int) -> tuple[Array, Array]:
-    """One cycle of a strip, each recording faster than the last."""
+    """One stretching cycle of a strip, faster in each recording."""
     seconds, rate_hz = ((200.0, 10.0), (66.0, 20.0), (40.0, 20.0))[number]
     time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
     return time_s, np.interp(time_s, [0.0, 0.5 * seconds, seconds], [0.0, 1.0, 0.0])
 
 
 def hand(rng: Generator, number: int) -> tuple[Array, Array]:
-    """A hand that never lets go."""
+    """A hand that never releases the sensor."""
     time_s = np.arange(0.0, 60.0, 0.01)
     swing = np.abs(np.convolve(rng.normal(0.0, 1.0, time_s.size + 200), np.hanning(160), "same")[100:-100])
     return time_s, 2.0 + 24.0 * swing / swing.max()
@@ -130,9 +131,10 @@ def steps(rng: Generator, number: int) -> tuple[Array, Array]:
 # -- sensors ----------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class OtherSensor:
-    """``reading`` (n,) of a load history, logged as ``column``; ``kinds``: families that a line and an arm of it lack.
+    """A sensor: ``reading`` (n,) of a load history, logged as ``column``.
 
-    ``beside``: families of which there is a little too, or which nothing but their size tells from those.
+    ``kinds``: families that a line and an arm of it lack. ``beside``: families that are present only slightly, or that
+    only their size distinguishes from those.
     """
 
     reading: Callable[[LoadHistory], Array]
@@ -144,10 +146,10 @@ class OtherSensor:
     fitted: int = 2
     held_out: int = 2
     logs: Callable[[LoadHistory], Mapping[str, Array]] = lambda history: {}
-    """Channels beside the reading, by column."""
+    """Channels logged beside the reading, by column."""
 
     def recordings(self, seed: int) -> tuple[list[Recording], list[Recording]]:
-        """Those to fit and those to judge on."""
+        """The recordings to fit, and those to judge the fit on."""
         rng = np.random.default_rng(seed)
         made = []
         for number in range(self.fitted + self.held_out):
@@ -200,7 +202,7 @@ def _fibre(history: LoadHistory) -> Array:
 
 
 def _relays(load_n: Array, highest_n: float, count: int = 25) -> Array:
-    """(n,) share of relays that are up, of all that switch up above where they switch down."""
+    """Share (n,) of relays that are up, for relays that switch up at a higher load than they switch down."""
     level = np.linspace(0.0, highest_n, count)
     ups, downs = np.meshgrid(level, level, indexing="ij")
     there, is_up, out = ups >= downs, np.zeros((count, count), dtype=bool), np.empty(load_n.size)
@@ -335,7 +337,7 @@ OTHER_SENSORS = {
     ),
     "sticky": OtherSensor(_sticky, presses(90, 50, 20), "pressure_v", 0.01, {"asymmetry"}),
     "curing": OtherSensor(_curing, presses(300, 50, 20), "pressure_v", 0.01, {"gain_drift"}, {"softening"}),
-    # All of it softens, what relaxes too.
+    # The relaxing part softens too.
     "broken_in": OtherSensor(_broken_in, presses(120, 50, 20), "pressure_v", 0.01, {"softening"}),
     "with_play": OtherSensor(_with_play, presses(90, 50, 20), "pressure_v", 0.01, {"hysteresis"}, {"timing"}),
     "slow": OtherSensor(_slow, presses(90, 100, 40), "pressure_v", 0.02, {"timing"}),
@@ -345,7 +347,7 @@ OTHER_SENSORS = {
     "thickening": OtherSensor(_thickening, presses(90, 100, 100, ramp_s=(0.1, 4.0)), "pressure_v", 0.03, {"rate"}),
     "one_press_each": OtherSensor(_curved, one_press, "pressure_v", 0.02, {CURVE}, fitted=10, held_out=4),
     "noisy_load": OtherSensor(_curved, presses(90, 100, 60), "pressure_v", 0.6, {CURVE}),
-    # Of what is no entry of the catalogue nothing may be named.
+    # For effects that are not in the catalogue, nothing may be named.
     "reseated": OtherSensor(_reseated, presses(60, 50, 60), "pressure_v", 0.03, frozenset(), fitted=3),
     "beside_another": OtherSensor(_beside_another, presses(90, 100, 40), "pressure_v", 0.02, frozenset()),
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""What Chinimilli 2016 prints: constants (Section IV) and Tables 1 and 2, as data."""
+"""The numbers that Chinimilli 2016 prints: constants (Section IV) and Tables 1 and 2, as data."""
 
 from __future__ import annotations
 

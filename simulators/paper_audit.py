@@ -1,4 +1,4 @@
-"""The paper's numbers, recomputed: ``python -m simulators.paper_audit`` prints every figure of docs/paper_audit.md."""
+"""Recomputes the paper's numbers: ``python -m simulators.paper_audit`` prints every figure of docs/paper_audit.md."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def x_over_nrt() -> float:
 
 
 def air_volume_m3() -> float:
-    """nRT/Patm: the air that the printed n would be."""
+    """nRT/Patm in m³: the air volume that corresponds to the printed n."""
     return MOLES * GAS_CONSTANT * TEMPERATURE_K / AMBIENT_PA
 
 
 @dataclass(frozen=True)
 class Filter:
-    """(n0 z + n1)/(z + d1) at 100 Hz."""
+    """The discrete filter (n0 z + n1)/(z + d1) at 100 Hz."""
 
     n0: float
     n1: float
@@ -39,26 +39,26 @@ class Filter:
 
     @property
     def static_gain(self) -> float:
-        """At z = 1."""
+        """The gain at z = 1."""
         return (self.n0 + self.n1) / (1.0 + self.d1)
 
     @property
     def high_gain(self) -> float:
-        """At z = -1, half the sampling rate."""
+        """The gain at z = -1, half the sampling rate."""
         return (self.n0 - self.n1) / (1.0 - self.d1)
 
     def lead_deg(self, frequency_hz: float) -> float:
-        """Phase lead at ``frequency_hz``."""
+        """Phase lead in degrees at ``frequency_hz``."""
         z = np.exp(2j * np.pi * frequency_hz / RATE_HZ)
         return float(np.degrees(np.angle((self.n0 * z + self.n1) / (z + self.d1))))
 
     def run(self, u: Array) -> Array:
-        """From rest."""
+        """The filter's output (n,) for the input ``u`` (n,), starting from rest."""
         return np.asarray(lfilter([self.n0, self.n1], [1.0, self.d1], u), dtype=float)
 
 
 def from_stiffness(k1: float, k2: float, c: float = 1.0) -> Filter:
-    """Eqs. (2)-(4) through the bilinear transform at 100 Hz."""
+    """The filter of given stiffnesses: eqs. (2)-(4) through the bilinear transform at 100 Hz."""
     x, t = x_over_nrt(), 2.0 * RATE_HZ
     b1, b2, a1, a2 = k2 * (1 + k1 * x), c * (1 + (k1 + k2) * x), k2, c
     scale = a2 * t + a1
@@ -66,19 +66,19 @@ def from_stiffness(k1: float, k2: float, c: float = 1.0) -> Filter:
 
 
 def printed(unit: str) -> Filter:
-    """Table 1's transfer function."""
+    """The filter of a unit that Table 1 prints."""
     return Filter(*TABLE_1[unit][2:])
 
 
 def static_gain_interval(unit: str) -> tuple[float, float]:
-    """What the printed digits allow the static gain to be (half a unit of each last digit)."""
+    """The range of the static gain that the printed digits allow (half a unit of each last digit)."""
     _, _, n0, n1, d1 = TABLE_1[unit]
     numerator, denominator = n0 + n1, 1.0 + d1
     return (numerator - 1e-3) / (denominator + 5e-5), (numerator + 1e-3) / (denominator - 5e-5)
 
 
 def x_needed(unit: str) -> float:
-    """The x0^2/(nRT) that would bring the high-frequency gain of k1, k2 to the printed one."""
+    """The x0^2/(nRT) for which the high-frequency gain of k1, k2 would equal the printed one."""
     k1, k2, *_ = TABLE_1[unit]
     wanted = printed(unit).high_gain
     # At z = -1 the bilinear transform gives s = infinity: the gain is 1 + (k1 + k2) X.
@@ -86,7 +86,7 @@ def x_needed(unit: str) -> float:
 
 
 def rounding_loss_n() -> float:
-    """Largest error in N, left toe, on a held 800 N when its z-coefficients are rounded to four decimals."""
+    """Largest error in N of the left toe at a held 800 N, caused by rounding its z-coefficients to four decimals."""
     exact = from_stiffness(*TABLE_1["left_toe"][:2])
     rounded = Filter(*(round(value, 4) for value in (exact.n0, exact.n1, exact.d1)))
     hold = np.full(int(60 * RATE_HZ), PEAK_N / exact.static_gain)
@@ -94,12 +94,12 @@ def rounding_loss_n() -> float:
 
 
 def improvement(unit: str) -> list[tuple[float, float]]:
-    """Table 2's P% as printed and as it follows from the two RMSEs."""
+    """Table 2's P% as printed, and as it follows from the two RMSEs."""
     return [(said, 100.0 * (raw - filtered) / raw) for _, raw, filtered, said in TABLE_2[unit]]
 
 
 def under_gain(unit: str) -> list[float]:
-    """g = RMSE(r)-explaining gain: with u = gamma x and r = g u, RMSE(r)/RMSE(u) = |1 - g gamma|/(1 - gamma)."""
+    """The gain g that explains RMSE(r): with u = gamma x and r = g u, RMSE(r)/RMSE(u) = |1 - g gamma|/(1 - gamma)."""
     found = []
     for _, raw, filtered, _ in TABLE_2[unit]:
         gamma = 1.0 - raw / TRIANGLE_RMS
@@ -112,8 +112,8 @@ def under_gain(unit: str) -> list[float]:
 def least_filtered_rmse(unit: str) -> tuple[float, ...]:
     """The smallest RMSE(r) in N that the printed filter can give for *any* raw signal with Table 2's RMSE(u).
 
-    A least-squares problem with one quadratic constraint: minimise |x - H u|^2 over |x - u| = RMSE(u) sqrt(N),
-    by its multiplier: (H'H + m) u = H'x + m x; one triangle at each rate.
+    A least-squares problem with one quadratic constraint: minimise |x - H u|^2 subject to |x - u| = RMSE(u) sqrt(N), by
+    its multiplier: (H'H + m) u = H'x + m x; one triangle at each rate.
     """
     found = []
     filter_ = printed(unit)
@@ -144,7 +144,7 @@ def least_filtered_rmse(unit: str) -> tuple[float, ...]:
 
 
 def report() -> list[str]:
-    """Every figure, a line each."""
+    """Every figure, one line each."""
     x, bore = x_over_nrt(), math.pi * DIAMETER_M**2 / 4
     lines = [
         f"X = x0^2/(nRT) = {x:.5f} m/N",

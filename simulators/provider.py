@@ -1,4 +1,4 @@
-"""The entry point "sim" of smartshoe's devices.
+"""The provider of simulated devices, entry point "sim" of ``smartshoe.devices``.
 
 It opens ``sim:instron``, ``sim:walk``, ``sim:run``, ``sim:stand`` and ``sim:tiptoe``.
 """
@@ -23,17 +23,17 @@ DEFAULT_UNIT = "left_toe"
 
 
 class Provider:
-    """Makes simulated devices from a target and options; heavy imports wait until one is asked for."""
+    """Creates simulated devices from a target and options; heavy imports are deferred until then."""
 
     def open_machine(
         self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
     ) -> SimulatedInstron:
         """A machine (closed, to be used in a with block) for ``target`` 'instron'.
 
-        ``options`` are `simulators.benches.machine_options.MachineOptions`; what they leave out comes from the preset
-        of their ``unit`` (default left_toe). ``bladder = {twin = "unit.json"}`` presses the unit's own calibration
-        instead (`simulators.instruments.twin`). Raises `pydantic.ValidationError` on wrong options, `UsageError` on
-        a wrong target, `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
+        ``options`` are `simulators.benches.machine_options.MachineOptions`; omitted ones come from the preset of their
+        ``unit`` (default left_toe). ``bladder = {twin = "unit.json"}`` presses the unit's own calibration instead
+        (`simulators.instruments.twin`). Raises `pydantic.ValidationError` for wrong options, `UsageError` for a wrong
+        target, `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
         """
         _require(target, MACHINES, "machine")
         import numpy as np
@@ -49,7 +49,7 @@ class Provider:
         kind = TwinMachineOptions if is_twin(given) else MachineOptions
         checked = kind.model_validate(with_preset(given["unit"], given))
         rng = rng if rng is not None else np.random.default_rng(0)
-        sequence: Any = rng.bit_generator.seed_seq  # numpy's own has these; its protocol does not say so
+        sequence: Any = rng.bit_generator.seed_seq  # numpy's own has these attributes, though its protocol lacks them
         seed = "/".join(str(key) for key in (sequence.entropy, *sequence.spawn_key))
         sensor = SimulatedHdiSensor(checked.sensor.parameters(), rng)
         bladder: Any
@@ -67,7 +67,7 @@ class Provider:
     ) -> SimulatedShoe:
         """A shoe (closed, to be used in a with block) for ``target`` 'walk', 'stand', 'run' or 'tiptoe'.
 
-        ``options`` are `simulators.benches.shoe_options.ShoeOptions`; raises as `open_machine` does.
+        ``options`` are `simulators.benches.shoe_options.ShoeOptions`; raises the errors of `open_machine`.
         """
         _require(target, SHOES, "shoe")
         import numpy as np

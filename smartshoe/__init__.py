@@ -107,7 +107,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name == "gait":  # a room whose functions are called by its name: smartshoe.gait.analyse
+    if name == "gait":  # a package whose functions are called by its name: smartshoe.gait.analyse
         return importlib.import_module("smartshoe.gait")
     home = _HOME.get(name)
     if home is None:

@@ -1,4 +1,4 @@
-"""Arrays by what they hold; their shapes stand in the docstrings, ``(n,)`` for n samples, ``(n, r)`` for r columns."""
+"""Array types by content; docstrings give their shapes, ``(n,)`` for n samples, ``(n, r)`` for r columns."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Integers = NDArray[np.int64]
 
 
 def numbers_of(values: ArrayLike, what: str) -> Array:
-    """``values`` as real numbers, not copied where they are; raises `InputError` naming ``what`` where they are none.
+    """``values`` as an array of real numbers, without a copy if possible.
 
-    None among them counts as NaN, as in a table read elsewhere.
+    Raises `InputError` naming ``what`` otherwise. None counts as NaN, as in tables read by other libraries.
     """
     try:
         given: Any = values if hasattr(getattr(values, "dtype", None), "kind") else np.asarray(values)
@@ -28,9 +28,9 @@ def numbers_of(values: ArrayLike, what: str) -> Array:
             kinds = {np.asarray(one).dtype.kind for one in of_each_type.values()}
         if "c" in kinds:  # numpy would drop the imaginary part
             raise TypeError("complex numbers")
-        if kinds & set("mM"):  # numpy would count nanoseconds, or days
+        if kinds & set("mM"):  # numpy would convert to nanoseconds, or days
             raise TypeError("dates or durations: seconds are (t - t[0]) / numpy.timedelta64(1, 's')")
-        if kinds & set("SU"):  # numpy would read it
+        if kinds & set("SU"):  # numpy would parse the text
             raise TypeError("text")
         if values is None:
             raise TypeError("None")
@@ -40,7 +40,7 @@ def numbers_of(values: ArrayLike, what: str) -> Array:
 
 
 def require_positive(value: Any, name: str) -> float:
-    """``value`` as a finite number above 0; raises `UsageError` naming it where it is none."""
+    """``value`` as a finite number above 0; raises `UsageError` naming ``name`` otherwise."""
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""How a result shows itself to a person: one line, a table as text, the same table in a notebook, a figure."""
+"""How results are shown to users: one line, a table as text, the same table in a notebook, a figure."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_NAMES = 10  # of columns in a sentence
-SUREST = 0.99  # of a probability that is said in percent
+MOST_NAMES = 10  # column names in a sentence
+SUREST = 0.99  # largest probability given in percent
 
 
 def first_names(names: Sequence[str]) -> str:
-    """The names, at most `MOST_NAMES` of them, and how many more there are."""
+    """The names as text, at most `MOST_NAMES` of them, and how many more there are."""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return ", ".join(names[:MOST_NAMES]) + more
 
@@ -47,7 +47,7 @@ class SummaryTable:
         return "\n".join([*lines, *self.remarks])
 
     def to_html(self) -> str:
-        """The same for a notebook; every text is escaped."""
+        """The table for a notebook; every text is escaped."""
         head = "".join(f"<th>{html.escape(cell)}</th>" for cell in self.columns)
         body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in self.rows)
         table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>" if self.rows else ""
@@ -73,10 +73,10 @@ class Shown(ABC):
 
 
 class Summarised(Shown):
-    """The same with the table as text."""
+    """A `Shown` result whose table is also available as text."""
 
     def summary(self) -> str:
-        """The table for a person, as text of several lines."""
+        """The table as text of several lines."""
         return self._summary_table().to_text()
 
 
@@ -86,23 +86,24 @@ def significant(value: float | None, digits: int = 4) -> str:
 
 
 def percent(share: float, *, signed: bool = False) -> str:
-    """A share in percent to two digits, of a hundred and more to the last before the decimal point."""
+    """A share in percent to two digits; of a hundred and more, to whole numbers."""
     value = 100.0 * share
     sign = "+" if signed else ""
     return f"{value:{sign}.0f} %" if abs(value) >= 99.5 else f"{value:{sign}.2g} %"
 
 
 def sure(probability: float) -> str:
-    """A probability as a person takes it; never a hundred percent."""
+    """A probability in percent for the user; never a hundred percent."""
     if not math.isfinite(probability):
         return "–"
     return f"over {100 * SUREST:.0f} %" if probability > SUREST else f"{100 * probability:.0f} %"
 
 
 def moment(time_s: float, digits: int = 6) -> str:
-    """A time of a recording in seconds: ``digits`` digits, and of later ones as many decimals as that leaves of 100 s.
+    """A time of a recording in seconds with ``digits`` digits; later times keep the decimals that 100 s would have.
 
-    A clock that counts from 1970 has ten digits before its decimal point, of which six tell no stretch from another.
+    A clock that counts from 1970 has ten digits before its decimal point, so that six digits could not distinguish
+    times.
     """
     late = abs(time_s) >= 10.0 ** (digits - 1)
     if not late:
@@ -112,7 +113,7 @@ def moment(time_s: float, digits: int = 6) -> str:
 
 
 def panels(count: int, *, height: float = 2.6) -> tuple[Figure, list[Axes]]:
-    """A figure of ``count`` axes below each other, outside pyplot: nothing stays open."""
+    """A figure with ``count`` axes below each other, created without pyplot, so that no figure stays open."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.0, height * count + 0.4), layout="constrained")

@@ -1,19 +1,19 @@
-"""The errors a person meets: one hierarchy, each with the exit status the command line gives it.
+"""The errors that users see: one hierarchy, each with the exit status that the command line gives it.
 
-A message is one sentence: what, where (file, line, column or key), how to mend it.
+A message is one sentence: what is wrong, where (file, line, column or key), and how to fix it.
 """
 
 from __future__ import annotations
 
 
 class SmartShoeError(Exception):
-    """Root of every error that smartshoe raises on purpose; ``exit_status`` is the command line's."""
+    """Root of all errors that smartshoe raises deliberately; ``exit_status`` is that of the command line."""
 
     exit_status = 2
 
 
 class UsageError(SmartShoeError, ValueError):
-    """A command line, an argument or an output place is wrong."""
+    """A command line, an argument or an output path is wrong."""
 
 
 class ScenarioError(UsageError):
@@ -21,7 +21,7 @@ class ScenarioError(UsageError):
 
 
 class OptionError(UsageError):
-    """A device's option is wrong; ``keys`` lead to it, and the cause is what checked it."""
+    """A device's option is wrong; ``keys`` are the path to it, and the cause is the error of the check."""
 
     def __init__(self, message: str, keys: tuple[str | int, ...] = ()) -> None:
         super().__init__(message)
@@ -29,7 +29,7 @@ class OptionError(UsageError):
 
 
 class LimitError(UsageError):
-    """A protocol or setting goes beyond what a device may be asked for."""
+    """A protocol or setting exceeds what a device may be asked for."""
 
 
 class InputError(SmartShoeError, ValueError):
@@ -39,18 +39,18 @@ class InputError(SmartShoeError, ValueError):
 
 
 class FormatError(InputError):
-    """A file is not in the format that its name or its beginning promises."""
+    """A file is not in the format that its name or its beginning suggests."""
 
 
 class MissingChannelError(InputError, KeyError):
     """A recording lacks a channel that is needed."""
 
-    def __str__(self) -> str:  # KeyError would print the repr
+    def __str__(self) -> str:  # KeyError's own would print the repr
         return str(self.args[0]) if self.args else ""
 
 
 class UnitError(InputError):
-    """A unit is unknown, or of another quantity than is needed."""
+    """A unit is unknown, or of another quantity than required."""
 
 
 class DeviceError(SmartShoeError, OSError):
@@ -64,7 +64,7 @@ class DeviceTimeoutError(DeviceError, TimeoutError):
 
 
 class RefusedError(SmartShoeError):
-    """The data does not support the result that was asked for."""
+    """The data do not support the requested result."""
 
     exit_status = 5
 
@@ -74,4 +74,4 @@ class NotIdentifiableError(RefusedError):
 
 
 class NotConvergedError(RefusedError):
-    """An iteration ended without settling."""
+    """An iteration ended without converging."""

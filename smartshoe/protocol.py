@@ -1,4 +1,4 @@
-"""What a testing machine is asked to do: load against time as a list of segments, checked before anything moves."""
+"""Protocols for testing machines: load against time as a list of segments, checked before anything moves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ DYNAMIC_RATES_N_PER_S = (50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A straight line in load: from the load reached so far to ``load_n`` within ``duration_s``; a hold keeps it."""
+    """A straight line in load, from the load reached so far to ``load_n`` within ``duration_s``.
+
+    Equal loads are a hold.
+    """
 
     kind: Literal["ramp", "hold", "rest"]
     load_n: float
@@ -28,7 +31,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class MachineLimits:
-    """What a machine and the sensor on it stand; None where there is no limit."""
+    """The largest loads and rates that a machine and the sensor on it withstand; None where there is no limit."""
 
     load_n: float | None = None
     rate_n_per_s: float | None = None
@@ -43,7 +46,7 @@ class Protocol:
     segments: tuple[Segment, ...]
 
     def __post_init__(self) -> None:
-        """Raise `LimitError` for numbers that are none, and for more segments or a longer run than the limits."""
+        """Raise `LimitError` for values that are not finite, or more segments or a longer duration than allowed."""
         most, longest_s = limits().segments, limits().duration_s
         if len(self.segments) > most:
             raise LimitError(
@@ -72,12 +75,12 @@ class Protocol:
 
     @property
     def peak_load_n(self) -> float:
-        """The largest load asked for."""
+        """The largest commanded load in N."""
         return max((segment.load_n for segment in self.segments), default=0.0)
 
     @property
     def peak_rate_n_per_s(self) -> float:
-        """The steepest ramp, either way."""
+        """The steepest ramp in N/s, up or down."""
         rate, load = 0.0, 0.0
         for segment in self.segments:
             if segment.duration_s > 0.0:
@@ -94,7 +97,7 @@ class Protocol:
         return np.interp(time_s, *self.corners())
 
     def check(self, limits: MachineLimits) -> None:
-        """Raise `LimitError` where the protocol asks for more than ``limits`` allow."""
+        """Raise `LimitError` where the protocol exceeds ``limits``."""
         if limits.load_n is not None and self.peak_load_n > limits.load_n:
             raise LimitError(
                 f"protocol {self.name} asks for {self.peak_load_n:g} N, the machine's limit is {limits.load_n:g} N:"
@@ -129,9 +132,9 @@ def static_protocol(
     loads_n
         The loads that are held, in N.
     rate_n_per_s
-        Of the ramps, in N/s.
+        Rate of the ramps, in N/s.
     approach_n, approach_s
-        The last newtons of a load are put on slowly, within so many seconds.
+        The last part of each load, in N, which is applied slowly, and how long that takes, in s.
     hold_s, rest_s
         How long a load is held, and the rest after it, in s.
 
@@ -169,11 +172,11 @@ def dynamic_protocol(
     rates_n_per_s
         Loading and unloading rate of each triangle, in N/s.
     peak_n
-        Where it turns, in N.
+        Peak load of the triangles, in N.
     repeats
-        How often all of them come.
+        How often the whole series of rates is repeated.
     rest_s
-        Before and after each, in s. The paper gives no rest between triangles; 0 leaves it out.
+        Rest before and after each triangle, in s. The paper states no rest between triangles; 0 omits it.
 
     Notes
     -----

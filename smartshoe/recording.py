@@ -1,7 +1,7 @@
-"""`Recording`: named, united, immutable channels on a time base; the one thing that rooms hand each other.
+"""`Recording`: immutable channels with names and units on one time base, exchanged between all packages.
 
 Numbers stay exactly as the instrument logged them, each channel with its unit, so that reading and writing lose
-nothing; a computation asks for SI by name (``recording.force_n``, ``channel.si``) or for a unit explicitly.
+nothing; a computation requests SI by name (``recording.force_n``, ``channel.si``) or a unit explicitly.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ Role = Literal["load", "sensor", "command", "auxiliary"]
 REGIONS = ("toe", "meta1", "meta4", "heel")
 UNITS_OF_A_SHOE = REGIONS + tuple(f"{side}_{region}" for side in ("left", "right") for region in REGIONS)
 LOAD_NAME, COMMAND_NAME, SENSOR_NAME = "force", "command", "pressure"
-TIME_NAME = "time"  # the time base's: no channel has it
+TIME_NAME = "time"  # the name of the time base, which no channel may have
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One signal of a recording.
 
-    ``values`` (n,) are finite and read-only, in ``unit``; where ``missing`` (n,) is True the sample was not there
-    and its value repeats the last one that was. ``range_`` and ``resolution`` are the instrument's, in ``unit``.
+    ``values`` (n,) are finite and read-only, in ``unit``; where ``missing`` (n,) is True there was no sample, and the
+    value repeats the last one. ``range_`` and ``resolution`` are the instrument's, in ``unit``.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Channel:
 
     @classmethod
     def from_values(cls, name: str, values: ArrayLike, unit: Unit, role: Role = "auxiliary") -> Self:
-        """A channel from numbers as they come: non-finite ones become missing samples."""
+        """A channel from arbitrary numbers: non-finite ones become missing samples."""
         array = np.array(numbers_of(values, f"channel {name}"), copy=True)
         if array.ndim != 1:
             raise InputError(f"channel {name} has shape {array.shape}: give one number per sample")
@@ -85,7 +85,7 @@ class Channel:
         return np.ones(self.values.size, dtype=bool) if self.missing is None else ~self.missing
 
     def with_nan(self) -> Array:
-        """(n,) values with NaN at missing samples: for the edges (files, plots) only."""
+        """(n,) values with NaN at missing samples: only for output (files, plots)."""
         if self.missing is None:
             return self.values
         return np.where(self.missing, np.nan, self.values)
@@ -113,9 +113,9 @@ def _role_of(name: str, unit_: Unit) -> Role:
 
 
 def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> int | None:
-    """The auxiliary channel that is the only one beside a load, if it states a unit of what a sensor gives.
+    """Index of the only auxiliary channel beside a load, if its unit is one of sensor readings; else None.
 
-    A crosshead's and the room's may stand beside it, and are none.
+    Channels of the crosshead and of the room do not count.
     """
     beside = {"length", "temperature"}
     left = [
@@ -130,8 +130,8 @@ def only_reading(roles: Sequence[Role | None], units: Sequence[Unit | None]) -> 
 
 
 def split_column(column: str) -> tuple[str, Unit | None]:
-    """A plain table's column ``name_unit`` as its name and unit (None where the ending is no unit)."""
-    for cut in range(len(column)):  # the longest ending that is a unit: force_n_per_s before force_n_per + s
+    """A plain table's column ``name_unit`` as its name and unit (None where the suffix is not a unit)."""
+    for cut in range(len(column)):  # the longest suffix that is a unit: force_n_per_s before force_n_per + s
         if column[cut] == "_" and 0 < cut < len(column) - 1:
             found = unit_of_suffix(column[cut + 1 :])
             if found is not None:
@@ -143,9 +143,9 @@ def split_column(column: str) -> tuple[str, Unit | None]:
 class Recording(Summarised):
     """One experiment: channels on one time base.
 
-    ``time_s`` (n,) increases strictly; its step may vary. ``unit`` names the sensing unit (``left_toe``).
-    ``metadata`` holds what the file said of itself, ``source`` where it came from, ``notes`` what the reader did
-    to it (rows dropped, signs turned) in one sentence each.
+    ``time_s`` (n,) increases strictly; its step may vary. ``unit`` names the sensing unit (``left_toe``). ``metadata``
+    holds the information in the file, ``source`` its origin, ``notes`` the changes that the reader made (rows dropped,
+    signs reversed), one sentence each.
     """
 
     time_s: Array
@@ -199,10 +199,10 @@ class Recording(Summarised):
         metadata: Mapping[str, str] | None = None,
         **columns: ArrayLike,
     ) -> Self:
-        """A recording from arrays named as a plain table's columns: ``force_n=``, ``pressure_mbar=``, ...
+        """A recording from arrays named like a plain table's columns: ``force_n=``, ``pressure_mbar=``, ...
 
-        A single column beside the load is the reading if its unit is one that sensors give (``cell_v=``). NaN marks a
-        missing sample. Raises `UnitError` for a name without a unit, `InputError` for what is no number,
+        A single column beside the load is the reading if its unit is one of sensor readings (``cell_v=``). NaN marks a
+        missing sample. Raises `UnitError` for a name without a unit, `InputError` for values that are not numbers,
         shapes that differ or time that does not increase.
         """
         channels: dict[str, Channel] = {}
@@ -211,7 +211,7 @@ class Recording(Summarised):
             if unit_ is None:
                 raise UnitError(f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar")
             channels[channel_name] = Channel.from_values(channel_name, values, unit_, _role_of(channel_name, unit_))
-        if SENSOR_NAME in channels:  # the unit under test; a shoe's named sensors beside it are its neighbours
+        if SENSOR_NAME in channels:  # the unit under test; other named sensors of the shoe are its neighbours
             channels = {
                 key: replace(one, role="auxiliary") if one.role == "sensor" and key != SENSOR_NAME else one
                 for key, one in channels.items()
@@ -223,18 +223,18 @@ class Recording(Summarised):
         return cls(numbers_of(time_s, f"{name}: time_s"), channels, name, unit, dict(metadata or {}))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Recordings travel between processes, though a mapping proxy does not."""
+        """Support pickling between processes, which a mapping proxy does not."""
         plain = (self.time_s, dict(self.channels), self.name, self.unit, dict(self.metadata), self.source, self.notes)
         return type(self), plain
 
-    # -- what it is ------------------------------------------------------------------------------------------
+    # -- properties ------------------------------------------------------------------------------------------
     @property
     def label(self) -> str:
-        """The file, or else the name: what an error message calls this recording."""
+        """The file, or else the name, by which error messages refer to this recording."""
         return self.source or self.name
 
     def positive(self, key: str, unit: str) -> float:
-        """The number that the metadata states under ``key``; raises `InputError` where it is none above 0."""
+        """The number under ``key`` in the metadata; raises `InputError` unless it is above 0."""
         text = self.metadata[key]
         try:
             value = float(text)
@@ -257,19 +257,19 @@ class Recording(Summarised):
 
     @property
     def duration_s(self) -> float:
-        """Time from the first sample to the last."""
+        """Time in s from the first sample to the last."""
         return float(self.time_s[-1] - self.time_s[0])
 
     @cached_property
     def sample_time_s(self) -> float:
-        """The median step, or that of the even grid from which time was rounded: `usual_step_s` of it."""
+        """The median step in s, or that of the even grid from which the times were rounded: see `usual_step_s`."""
         if len(self) < 2:
             raise InputError(f"{self.label} holds one sample: a signal needs two at least")
         return usual_step_s(self.time_s)
 
     @property
     def sample_rate_hz(self) -> float:
-        """Samples a second while none is missing: `sample_rate_of` its time."""
+        """Samples per second where none is missing: `sample_rate_of` its time."""
         if len(self) < 2:
             raise InputError(f"{self.label} holds one sample: a rate needs two at least")
         return sample_rate_of(self.time_s)
@@ -281,7 +281,7 @@ class Recording(Summarised):
         return bool(step.size == 0 or np.all(np.abs(step - np.median(step)) <= SAME_STEP * np.median(step)))
 
     def plot(self) -> Figure:
-        """A figure: every channel over time, those of one unit of measurement on one axis; NaN leaves a gap."""
+        """A figure of every channel over time, with one axis per unit of measurement; NaN leaves a gap."""
         symbols = list(dict.fromkeys(channel.unit.symbol for channel in self.channels.values()))
         figure, axes = panels(max(len(symbols), 1))
         for axis, symbol in zip(axes, symbols, strict=False):
@@ -307,7 +307,7 @@ class Recording(Summarised):
             self.notes,
         )
 
-    # -- what it holds ---------------------------------------------------------------------------------------
+    # -- channels --------------------------------------------------------------------------------------------
     def of_role(self, role: Role) -> tuple[Channel, ...]:
         """The channels of one role, in the recording's order."""
         return tuple(channel for channel in self.channels.values() if channel.role == role)
@@ -335,7 +335,7 @@ class Recording(Summarised):
 
     @property
     def sensor(self) -> Channel:
-        """The one reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
+        """The only reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
         found = self.sensors
         if len(found) != 1:
             what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
@@ -347,7 +347,7 @@ class Recording(Summarised):
         return found[0]
 
     def _named_by(self, option: str, column: str, name: str, suffix: str) -> str:
-        """How a person says which column is meant: of a file by an ``option``, of arrays by their names."""
+        """How the user can choose a column: for a file by an ``option``, for arrays by their names."""
         if not self.source:
             return f"name its array {name}_ and its unit, for example {name}_{suffix}="
         example = f", for example {option} '{column}'" if column else ""
@@ -360,7 +360,7 @@ class Recording(Summarised):
 
     @property
     def pressure_pa(self) -> Array:
-        """(n,) the unit's gauge pressure in pascal; raises `UnitError` where the sensor is no pressure."""
+        """(n,) the unit's gauge pressure in pascal; raises `UnitError` where the sensor's reading is not a pressure."""
         sensor = self.sensor
         if sensor.unit.quantity != "pressure":
             raise UnitError(f"{self.label}: {sensor.name} is in {sensor.unit.symbol}, not a pressure")
@@ -372,9 +372,9 @@ class Recording(Summarised):
         found = self.of_role("command")
         return found[0].si if found else None
 
-    # -- what it becomes -------------------------------------------------------------------------------------
+    # -- changed copies --------------------------------------------------------------------------------------
     def with_channel(self, channel: Channel) -> Recording:
-        """This recording with ``channel`` added, or put in the place of its namesake."""
+        """This recording with ``channel`` added, or replacing the one of the same name."""
         return replace(self, channels={**self.channels, channel.name: channel})
 
     def without(self, *names: str) -> Recording:
@@ -410,15 +410,15 @@ class Recording(Summarised):
 
 
 def column_name(channel: Channel) -> str:
-    """The plain table's column for a channel: its name with the unit's ending."""
+    """The plain table's column for a channel: its name with the unit's suffix."""
     return f"{channel.name}_{channel.unit.suffix}"
 
 
 def sample_rate_of(time_s: Array) -> float:
-    """Samples a second while none is missing, in Hz, of time stamps (n,), two at least.
+    """Sampling rate in Hz, while no sample is missing, of time stamps (n,), at least two.
 
-    By the grid that they were rounded from, where they were: to milliseconds those of 90 Hz are 11 ms apart more often
-    than not. Else by the mean step but for gaps.
+    If the stamps were rounded from an even grid, its rate is used: at 90 Hz, stamps rounded to milliseconds are mostly
+    11 ms apart. Otherwise the mean step without gaps.
     """
     step_s = rounded_grid_step_s(time_s)
     return 1.0 / (mean_step_s(time_s) if step_s is None else step_s)

@@ -1,4 +1,4 @@
-"""Units of measurement: what a header's text means, and the way to SI."""
+"""Units of measurement: parsed from headers, and converted to SI."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from smartshoe.errors import UnitError
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit: ``si = value * scale + offset``; ``symbol`` is what a person reads, ``suffix`` a column's ending."""
+    """A unit: ``si = value * scale + offset``.
+
+    ``symbol`` is its display form, ``suffix`` the ending of a column's name.
+    """
 
     symbol: str
     suffix: str
@@ -23,21 +26,21 @@ class Unit:
     offset: float = 0.0
 
     def to_si(self, values: ArrayLike) -> Array:
-        """Values of this unit in the quantity's SI unit (a new array unless the unit is SI)."""
+        """Values of this unit converted to the quantity's SI unit (a new array unless the unit is SI)."""
         array = np.asarray(values, dtype=float)
         if self.scale == 1.0 and self.offset == 0.0:
             return array
         return array * self.scale + self.offset
 
     def from_si(self, values: ArrayLike) -> Array:
-        """SI values in this unit."""
+        """SI values converted to this unit."""
         array = np.asarray(values, dtype=float)
         if self.scale == 1.0 and self.offset == 0.0:
             return array
         return (array - self.offset) / self.scale
 
     def convert(self, values: ArrayLike, to: Unit) -> Array:
-        """Values of this unit in unit ``to``; raises `UnitError` between different quantities."""
+        """Values of this unit converted to unit ``to``; raises `UnitError` between different quantities."""
         if to == self:
             return np.asarray(values, dtype=float)
         if to.quantity != self.quantity:
@@ -60,7 +63,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("nN", "nanonewton", "force", 1e-9, 0.0, ()),
     ("MN", "meganewton", "force", 1e6, 0.0, ()),
     ("daN", "dan", "force", 10.0, 0.0, ()),
-    ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # of a load cell that reads mass
+    ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # a load cell may be scaled in units of mass
     ("gf", "gf", "force", 9.80665e-3, 0.0, ()),
     ("lbf", "lbf", "force", 4.4482216152605, 0.0, ("lb", "lbs")),
     ("Pa", "pa", "pressure", 1.0, 0.0, ("pascal", "帕")),
@@ -108,7 +111,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("mm/mm", "mm_per_mm", "ratio", 1.0, 0.0, ()),
     ("1", "1", "dimensionless", 1.0, 0.0, ("-", "a.u.", "au")),
 ]
-# A pressure as the reference of a sensor that is pressed all over: the force on 1 cm².
+# For a sensor pressed all over, the reference may be a pressure: it becomes the force on 1 cm².
 _TABLE += [
     (f"{symbol}·cm²", f"{suffix}_cm2", "force", 1e-4 * scale, 0.0, ())
     for symbol, suffix, quantity, scale, _, _ in _TABLE
@@ -127,12 +130,12 @@ for _symbol, _suffix, _quantity, _scale, _offset, _words in _TABLE:
     for _word in _words:
         _BY_SYMBOL.setdefault(unicodedata.normalize("NFKC", _word), _unit)
         _BY_WORD.setdefault(unicodedata.normalize("NFKC", _word).casefold(), _unit)
-_BY_SUFFIX["kg"] = _BY_SUFFIX["kgf"]  # as of a header's "(kg)": nothing here has a mass
+_BY_SUFFIX["kg"] = _BY_SUFFIX["kgf"]  # like a header's "(kg)", since no channel here is a mass
 _BY_SUFFIX |= {word: unit for word, unit in _BY_WORD.items() if unit.quantity == "time"}  # timestamp_seconds
 
 
 def find_unit(text: str) -> Unit | None:
-    """The unit that a header's text names (``(kN)``, ``[mbar]``, ``sec``, ``毫米``), or None where it is not known."""
+    """The unit that a header's text names (``(kN)``, ``[mbar]``, ``sec``, ``毫米``), or None if it is unknown."""
     plain = unicodedata.normalize("NFKC", text).strip().strip("()[]{}").strip()
     if not plain:
         return None
@@ -140,7 +143,7 @@ def find_unit(text: str) -> Unit | None:
 
 
 def unit(text: str) -> Unit:
-    """The unit that ``text`` names; raises `UnitError` where it is not known."""
+    """The unit that ``text`` names; raises `UnitError` if it is unknown."""
     found = find_unit(text)
     if found is None:
         raise UnitError(f"unit {text!r} is not known: use one of {', '.join(row[0] for row in _TABLE)}")
@@ -148,17 +151,17 @@ def unit(text: str) -> Unit:
 
 
 def on_one_cm2(pressure: Unit) -> Unit:
-    """The unit of the force that a ``pressure`` of its unit exerts on 1 cm²: bar·cm² (10 N) for bar."""
+    """The unit of the force that one unit of ``pressure`` exerts on 1 cm²: bar·cm² (10 N) for bar."""
     return unit(f"{pressure.symbol}·cm²")
 
 
 def unit_of_suffix(suffix: str) -> Unit | None:
-    """The unit of a column's ending, as in ``pressure_mbar`` or ``load_mN``; None where it is none."""
+    """The unit of a column's suffix, as in ``pressure_mbar`` or ``load_mN``; None where it is not a unit."""
     return _BY_SUFFIX.get(suffix.casefold()) or _BY_SYMBOL.get(suffix)
 
 
 def declared(symbol: str) -> Unit:
-    """A unit that the table does not know, kept as declared (its quantity is ``unknown``)."""
+    """A unit that the table lacks, kept with its symbol (its quantity is ``unknown``)."""
     return Unit(symbol, symbol.strip().casefold().replace(" ", "_") or "1", "unknown")
 
 

@@ -1,1 +1,1 @@
-"""Who loads a plant: a testing machine, a worn shoe."""
+"""What loads a simulated unit: a testing machine, or a foot in a worn shoe."""

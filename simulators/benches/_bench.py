@@ -1,7 +1,7 @@
-"""A shoe's unit under a testing machine: one world's time, and two instruments with clocks of their own.
+"""A shoe's unit under a testing machine: one true time, and two instruments with their own clocks.
 
 The machine's trajectory presses the unit while the shoe streams; the shoe's other units lie beside the anvil. The
-shoe's clock runs too fast or slow and began before the machine's. *Left out:* the clock's drift with temperature,
+shoe's clock runs too fast or too slow and began before the machine's. *Left out:* the clock's drift with temperature,
 the machine's compliance acting back on the unit, load that reaches the neighbours through the insole.
 """
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from simulators.benches.shoe import SimulatedShoe
 
 
-LARGEST_SKEW_PPM = 100.0  # of two free crystals
+LARGEST_SKEW_PPM = 100.0  # between two free-running crystals
 LARGEST_OFFSET_S = 5.0
 
 
 class Bench:
-    """The anvil with one unit of a shoe on it; ``now_s`` is the world's time, which the shoe's samples move on.
+    """The anvil with one unit of a shoe on it; ``now_s`` is the true time, advanced by the shoe's samples.
 
-    The shoe's sample k is taken at k / rate (1 + skew) and says offset + k / rate. A skew or offset that is not given
+    The shoe takes sample k at k / rate (1 + skew) and labels it offset + k / rate. A skew or offset that is not given
     is drawn from ``rng``: within 100 ppm, and up to 5 s.
     """
 
@@ -54,7 +54,7 @@ class Bench:
         self.restart()
 
     def restart(self) -> None:
-        """The shoe is switched on: its clock begins, nothing presses it."""
+        """Switch the shoe on: its clock starts, and nothing presses it."""
         self.now_s = 0.0
         self.began_s: list[float] = []
         self._presses: list[tuple[float, Array, Array]] = []
@@ -62,7 +62,7 @@ class Bench:
 
     @property
     def specimen(self) -> SensingUnit:
-        """What the machine feels: the unit's own bladder and sensor, at rest."""
+        """The unit that the machine presses, with its own bladder and sensor, at rest."""
         on_anvil = next(u for u in self.shoe.units if u.name == self.unit)
         specimen = copy.deepcopy(on_anvil)
         specimen.bladder.reset()
@@ -70,28 +70,28 @@ class Bench:
         return specimen
 
     def press(self, truth: Truth) -> None:
-        """The machine's run begins now: its load acts on the unit from here on."""
+        """Start the machine's run now: its load acts on the unit from here on."""
         if self._presses and self.now_s < self._presses[-1][0] + self._presses[-1][1][-1]:
             raise DeviceError("the machine is still pressing: let the stream run to the end of the test first")
         self.began_s.append(self.now_s)
         self._presses.append((self.now_s, truth.time_s, truth.load_n))
 
     def load_n(self, time_s: Array) -> Array:
-        """The load (n,) in N on the unit at the world's times ``time_s`` (n,), 0 between tests."""
+        """The load (n,) in N on the unit at the true times ``time_s`` (n,), 0 between tests."""
         load = np.zeros(time_s.size)
         for begin_s, since_s, load_n in self._presses[-2:]:
             load += np.interp(time_s - begin_s, since_s, load_n, left=0.0, right=0.0)
         return load
 
     def stream(self, finest_step_hz: float) -> Iterator[Block]:
-        """The shoe's blocks without end, time as its own clock says it."""
+        """Endless blocks of the shoe, with times of its own clock."""
         p, shoe = self.shoe.parameters, self.shoe
         finer = max(1, int(np.ceil(finest_step_hz / p.sample_rate_hz)))
         fine_hz = p.sample_rate_hz * finer
         names = tuple(u.name for u in shoe.units)
         while True:
             first = self._taken
-            # The fine steps that end at this block's samples: memory carries on from one block to the next.
+            # Fine steps that end at this block's samples; the unit's memory continues from block to block.
             fine = np.arange((first - 1) * finer + 1, (first + p.block_samples - 1) * finer + 1) / fine_hz
             loads = self.load_n(fine * (1.0 + self.skew))
             readings = np.empty((p.block_samples, len(names)))

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from simulators.benches._bench import Bench
 
 
-LOAD_LIMIT_N = 2000.0  # Instron 5944
+LOAD_LIMIT_N = 2000.0  # of the Instron 5944's frame
 MILLIMETRE, CELSIUS = unit("mm"), unit("°C")
 
 
 @dataclass(frozen=True, slots=True)
 class InstronParameters:
-    """The machine: noise is a standard deviation a sample; the corner's rounding spans ``corner_s`` (0: sharp).
+    """The machine: noise is a standard deviation per sample; the rounding of corners spans ``corner_s`` (0: sharp).
 
-    ``load_cell_tare_n`` is what the load cell shows when nothing presses, in both logs.
+    ``load_cell_tare_n`` is what the load cell shows without load, in both logs.
     """
 
     fine_rate_hz: float = 1000.0
@@ -52,7 +52,7 @@ class InstronParameters:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What no instrument sees, at the fine step: all (n,), ``deformation`` the compressed share of the air."""
+    """Signals that no instrument records, at the fine step, all (n,); ``deformation`` is the air's compressed share."""
 
     time_s: Array
     command_n: Array
@@ -64,7 +64,7 @@ class Truth:
 
 
 class SimulatedInstron(TestMachine):
-    """A test machine on a virtual clock: a run takes as long as its arithmetic.
+    """A test machine on a virtual clock: a run takes only its computing time.
 
     Each run starts from a unit at rest. ``truth`` holds the last run at the fine step.
     """
@@ -93,21 +93,21 @@ class SimulatedInstron(TestMachine):
 
     @property
     def limits(self) -> MachineLimits:
-        """The frame's 2 kN and the sensor's proof pressure."""
+        """The frame's limit of 2 kN, and the sensor's proof pressure."""
         return MachineLimits(load_n=LOAD_LIMIT_N, pressure_pa=self.specimen.sensor.proof_pressure_pa)
 
     @property
     def logs(self) -> tuple[Recording, ...]:
-        """Bluehill's log (own clock) and the myRIO's (voltages) of the last run."""
+        """Bluehill's log (with its own clock) and the myRIO's (voltages) of the last run."""
         return self._logs
 
     @property
     def is_instant(self) -> bool:
-        """A run takes as long as its arithmetic."""
+        """True: a run takes only its computing time."""
         return True
 
     def under(self, shoe: Shoe, unit: str) -> None:
-        """Press that unit of a simulated shoe from now on, while the shoe streams (`simulators.benches._bench`)."""
+        """Press this unit of a simulated shoe from now on, while the shoe streams (`simulators.benches._bench`)."""
         from simulators.benches._bench import Bench
         from simulators.benches.shoe import SimulatedShoe
 
@@ -157,7 +157,7 @@ class SimulatedInstron(TestMachine):
             )
 
     def _trajectory(self, protocol: Protocol, time_s: Array) -> tuple[Array, Array]:
-        """Commanded and reached load (n,) in N: a centred average keeps ramps where they are and rounds corners."""
+        """Commanded and actual load (n,) in N: a centred average keeps ramps where they are and rounds corners."""
         command_n = protocol.load_at(time_s)
         width = round(self.parameters.corner_s * self.parameters.fine_rate_hz) | 1
         if width <= 1:
@@ -165,7 +165,7 @@ class SimulatedInstron(TestMachine):
         half = width // 2
         padded = np.concatenate([np.zeros(half + 1), command_n, np.full(half, command_n[-1])])
         cumulated = np.cumsum(padded)
-        # Rounding of the running sum is all that could be below zero.
+        # Only rounding of the running sum could give negative values.
         return command_n, np.maximum((cumulated[width:] - cumulated[:-width]) / width, 0.0)
 
     def _run_internal(self, protocol: Protocol) -> Recording:
@@ -191,8 +191,8 @@ class SimulatedInstron(TestMachine):
             "seed": self._seed,
             **getattr(bladder, "metadata", {}),
         }
-        # One load cell, one amplifier: both logs see the same electrical noise only where they sample together,
-        # which two free clocks do not.
+        # One load cell, one amplifier: both logs have the same electrical noise only where they sample simultaneously,
+        # which two free-running clocks do not.
         if self._bench is not None:
             self._bench.press(truth)
         machine = self._bluehill(truth, protocol, metadata)
@@ -241,7 +241,7 @@ class SimulatedInstron(TestMachine):
     def _joined(
         self, protocol: Protocol, machine: Recording, voltages: Recording, metadata: dict[str, str]
     ) -> Recording:
-        """Load and reading as the myRIO sampled them; the crosshead from Bluehill's log, set back to the start."""
+        """Load and reading as the myRIO sampled them, and Bluehill's crosshead, shifted to the same start."""
         time_s = voltages.time_s
         pressure_pa = self.specimen.sensor.to_pressure_pa(voltages["pressure"].with_nan())
         extension = machine["extension"]

@@ -1,4 +1,4 @@
-"""What a scenario may say of a testing machine; unknown keys and values out of bounds are errors."""
+"""A scenario's options of a testing machine; unknown keys and values out of bounds are errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from simulators.plant.bladder_parameters import BladderParameters
 
 
 class MachineOptions(Options):
-    """An Instron with one unit on its anvil."""
+    """Options of an Instron with one unit on its anvil."""
 
     unit: str
     bladder: BladderParameters
@@ -32,11 +32,11 @@ class MachineOptions(Options):
     neighbour: NeighbourUnit = NeighbourUnit()
 
     def parameters(self) -> InstronParameters:
-        """The machine's own part."""
+        """The parameters of the machine itself."""
         return InstronParameters(**{k: v for k, v in self if k not in ("unit", "bladder", "sensor", "daq")})
 
 
 class TwinMachineOptions(MachineOptions):
-    """An Instron with a twin on its anvil."""
+    """Options of an Instron with a twin on its anvil."""
 
     bladder: TwinOptions  # type: ignore[assignment]

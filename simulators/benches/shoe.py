@@ -1,7 +1,7 @@
 """A shoe of four sensing units, or a pair, on a virtual clock: feet press, a microcontroller samples and sends.
 
-*Left out:* Bluetooth's delays, losses and bursts (the wire's emulator has those), the clock's drift, cross talk
-between units.
+*Left out:* Bluetooth's delays, losses and bursts (the wire's emulator has those), the clock's drift, cross talk between
+units.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 
 FINEST_STEP_HZ = 1000.0
 CHUNK_S = 10.0
-LONGEST_TRUTH_S = 3600.0  # longer streams are for those who keep nothing
+LONGEST_TRUTH_S = 3600.0  # the truth of longer streams is not stored
 
 
 @dataclass(frozen=True, slots=True)
 class ShoeParameters:
-    """The stream: ``block_samples`` a block; ``adc_bits`` over 0-5 V for each unit.
+    """The stream: ``block_samples`` per block; ``adc_bits`` over 0-5 V for each unit.
 
-    On a bench (`simulators.benches._bench`) its clock is ``clock_skew_ppm`` and ``clock_offset_s`` off the world's,
-    drawn where they are None.
+    On a bench (`simulators.benches._bench`) its clock deviates from true time by ``clock_skew_ppm`` and
+    ``clock_offset_s``, which are drawn where they are None.
     """
 
     sample_rate_hz: float = 200.0
@@ -50,10 +50,10 @@ class ShoeParameters:
 
 @dataclass(frozen=True, eq=False)
 class ShoeTruth:
-    """What no instrument sees, at the readings' times: ``load_n`` and ``pressure_pa`` (n, units).
+    """Signals that no instrument records, at the readings' times: ``load_n`` and ``pressure_pa`` (n, units).
 
-    ``foot_n`` (n, feet) is the whole vertical force of each of ``feet``, with what passes beside the units; ``events``
-    are true ones in order of time.
+    ``foot_n`` (n, feet) is the entire vertical force of each of ``feet``, including the part that passes beside the
+    units; ``events`` are the true events in order of time.
     """
 
     time_s: Array
@@ -66,9 +66,9 @@ class ShoeTruth:
 
 
 class SimulatedShoe(Shoe):
-    """Units under one foot or two; ``profile`` is one of `PROFILES`. Each opening starts the stream afresh, from rest.
+    """Units under one foot or two; ``profile`` is one of `PROFILES`. Each opening restarts the stream, from rest.
 
-    ``truth`` is known once a stream of an hour at most has been read to its end.
+    ``truth`` is available once a stream of at most an hour has been read to its end.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class SimulatedShoe(Shoe):
         return self.parameters.sample_rate_hz
 
     def describe(self) -> tuple[ChannelDescription, ...]:
-        """One channel a unit, in mbar."""
+        """One channel per unit, in mbar."""
         step_v = self._sampler.adc.parameters.step_v
         return tuple(
             ChannelDescription(
@@ -120,7 +120,7 @@ class SimulatedShoe(Shoe):
             self.bench.restart()
 
     def converted_mbar(self, unit: SensingUnit, voltage_v: Array) -> Array:
-        """A unit's reading (n,) in mbar, from its sensor's voltage (n,) by way of the converter."""
+        """A unit's reading (n,) in mbar from its sensor's voltage (n,), through the converter."""
         return self._sampler.converted_mbar(unit, voltage_v)
 
     def _blocks_internal(self) -> Iterator[Block]:
@@ -139,7 +139,7 @@ class SimulatedShoe(Shoe):
         chunk = p.block_samples * max(1, round(CHUNK_S * p.sample_rate_hz / p.block_samples))
         for begin in range(0, count, chunk):
             end = min(begin + chunk, count)
-            # Each sample is the last of its fine steps; before time 0 there is no load. One step more, for events.
+            # Each sample is the last of its fine steps; before time 0 there is no load. One extra step is for events.
             fine_s = np.arange((begin - 1) * finer, (end - 1) * finer + 1) / fine_hz
             loads = plan.loads_n(fine_s)
             fine_n = np.column_stack([loads[1:, foot, column] for foot, column in places])
@@ -177,6 +177,6 @@ def _joined(truths: Sequence[ShoeTruth]) -> ShoeTruth:
 
 
 def _place(name: str) -> tuple[int, int]:
-    """Foot and column of a unit's load: 'left_toe' and 'toe' are both the left toe."""
+    """Index of foot and column of a unit's load; 'left_toe' and 'toe' both mean the left toe."""
     side, _, region = name.rpartition("_")
     return FEET.index(side or "left"), COLUMNS.index(region)

@@ -1,4 +1,4 @@
-"""What a scenario may say of a worn shoe; unknown keys and values out of bounds are errors."""
+"""A scenario's options of a worn shoe; unknown keys and values out of bounds are errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ def _within_limits(duration_s: float) -> float:
 
 
 class ShoeOptions(Options):
-    """A shoe of four units, or both; ``units`` maps a unit's name (``left_toe``) to what differs from its preset."""
+    """Options of a shoe of four units, or both shoes.
+
+    ``units`` maps a unit's name (``left_toe``) to changes of its preset.
+    """
 
     side: Literal["left", "right", "both"] = "left"
     units: dict[str, UnitOptions] = Field(default_factory=dict)
@@ -46,9 +49,9 @@ class ShoeOptions(Options):
     first_contact_s: NotNegative = 0.5
 
     def parameters(self) -> ShoeParameters:
-        """The stream."""
+        """The parameters of the stream."""
         return ShoeParameters(**self.model_dump(include=set(ShoeParameters.__dataclass_fields__)))
 
     def gait(self) -> Gait:
-        """The foot."""
+        """The gait of the person in the shoe."""
         return Gait(**self.model_dump(include=set(Gait.__dataclass_fields__)))

@@ -1,4 +1,4 @@
-"""Bounds of numbers that a scenario may give, and the strictness about unknown keys, shared by all options."""
+"""Bounds of numbers in a scenario, and the rejection of unknown keys, shared by all options."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Contact: which part of the load reaches the tube. Each acts on the load at the fine step, before wall and air.
+"""Contact: the part of the load that reaches the tube. Each effect acts on the load at the fine step.
 
 *Contact area*: asperities that share a growing load, F0 (1 - exp(-F/F0)) (Greenwood and Williamson's exponential
-heights). *Dead band*: windings of the coil that the insole reaches one after another, gaps spread evenly about a
-mean. *Direction*: friction of the insole against the tube, a factor exp(-mu) or exp(mu) of the load (a capstan's),
-whose sense turns over with pre-sliding; that takes longer the larger the load that is to slide. *Rate*: a
-visco-elastic cover that passes more of a fast load, in proportion to |F'|^0.9.
+heights). *Dead band*: windings of the coil that the insole reaches one after another, gaps spread evenly about a mean.
+*Direction*: friction of the insole against the tube, a factor exp(-mu) or exp(mu) of the load (a capstan's), which
+changes gradually after a reversal (pre-sliding); the change takes longer the larger the load. *Rate*: a visco-elastic
+cover that transmits more of a fast load, in proportion to |F'|^0.9.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ RATE_EXPONENT = 0.9
 
 @dataclass(frozen=True, slots=True)
 class ContactParameters:
-    """What stands between the plate and the tube; every effect is off by default.
+    """The contact between the plate and the tube; every effect is off by default.
 
-    ``saturation`` is full-scale load over F0. ``gap_n`` is the load at which the windings touch on average, spread
-    evenly by the share ``gap_spread`` of it. ``direction_gain`` is the share of the gain that is lost while the load
-    falls, once it has turned by a few ``direction_turn_n`` (at half of full scale). ``rate_gain`` is added to the gain
-    at 800 N/s, up or down, seen through ``rate_time_constant_s``.
+    ``saturation`` is full-scale load over F0. ``gap_n`` is the mean load at which the windings touch, spread evenly by
+    the share ``gap_spread`` of it. ``direction_gain`` is the share of the gain that is lost while the load falls, once
+    it has reversed by a few ``direction_turn_n`` (at half of full scale). ``rate_gain`` is added to the gain at 800
+    N/s, loading or unloading, seen through ``rate_time_constant_s``.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -44,7 +44,7 @@ class ContactParameters:
 
 @dataclass
 class ContactState:
-    """What the contact remembers between calls."""
+    """The contact's memory between calls."""
 
     direction: float = 1.0
     last_n: float = 0.0
@@ -55,7 +55,7 @@ class ContactState:
 def through_contact(
     contact: ContactParameters, load_n: Array, rate_hz: float, full_scale_n: float, state: ContactState
 ) -> Array:
-    """The load (n,) in N that reaches the tube, from the plate's (n,) at ``rate_hz``; ``state`` carries on."""
+    """The load (n,) in N that reaches the tube, from the plate's (n,) at ``rate_hz``; updates ``state``."""
     acting = load_n
     if contact.gap_n > 0:
         low, high = contact.gap_n * (1.0 - contact.gap_spread), contact.gap_n * (1.0 + contact.gap_spread)

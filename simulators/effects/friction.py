@@ -1,8 +1,8 @@
-"""Wall: friction that does not depend on rate, from its motion rather than from the load.
+"""Wall: rate-independent friction, driven by the wall's motion rather than by the load.
 
 *Stick-slip*: Jenkins elements (a spring behind a slider) whose slip distances are spread log-uniformly, on the
-deformation (Iwan 1966); the load enters only through the balance. *Bouc-Wen*: z' = e' (1 - |z|^n (gamma + beta
-sgn(e' z)))/width (Wen 1976) on the deformation, by Heun's rule; with gamma = 0 and n = 1 it is Dahl's friction.
+deformation (Iwan 1966); the load enters only through the balance. *Bouc-Wen*: z' = e' (1 - |z|^n (gamma + beta sgn(e'
+z)))/width (Wen 1976) on the deformation, by Heun's rule; with gamma = 0 and n = 1 it is Dahl's friction.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SlipShare = Annotated[float, Field(gt=1e-3, lt=1)]
 
 @dataclass(frozen=True, slots=True)
 class StickSlipParameters:
-    """Sliders that together hold ``strength`` of full-scale load once all slip.
+    """Sliders that together hold ``strength`` of full-scale load once all of them slip.
 
     They begin to slip between ``first_slip`` and ``last_slip`` of the full-scale deformation after a reversal.
     """
@@ -34,7 +34,7 @@ class StickSlipParameters:
     last_slip: SlipShare = 0.2
 
     def elements(self, full_scale: float, full_e: float) -> tuple[Array, Array]:
-        """Each element's spring (stress a deformation) and greatest stress, for full-scale stress ``full_scale``."""
+        """Each element's spring constant (stress per deformation) and largest stress, for a full-scale stress."""
         if self.strength == 0.0:
             return np.zeros(0), np.zeros(0)
         slip = np.geomspace(self.first_slip, self.last_slip, ELEMENTS) * full_e
@@ -46,7 +46,7 @@ class StickSlipParameters:
 class BoucWenParameters:
     """Friction up to ``strength`` of full-scale load, reached over about ``width`` of the full-scale deformation.
 
-    ``gamma`` and beta = 1 - gamma part what slows the slide from what the reversal adds; passive up to a half.
+    ``gamma`` and beta = 1 - gamma shape the sliding and the reversal; the friction is passive for gamma up to a half.
     """
 
     __pydantic_config__ = STRICT_KEYS

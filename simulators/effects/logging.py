@@ -1,8 +1,8 @@
 """Logger: what happens to the reading's channel between the sensor's pin and the file.
 
-*Clocks*: the reading's own transport delay, skew and jitter against the load's channel. *Analogue*: mains hum with
-a third of it in the third harmonic, a coarse quantisation grid. *Digital*: spikes, held samples and dropouts in runs.
-Percent are of the sensor's range.
+*Clocks*: the reading's own transport delay, skew and jitter against the load's channel. *Analogue*: mains hum, with a
+third of it in the third harmonic, and a coarse quantisation grid. *Digital*: spikes, held samples and dropouts in runs.
+Percentages are of the sensor's range.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from smartshoe.arrays import Array, Mask
 class ReadingChannel:
     """The reading's channel of a logger; every fault is off by default.
 
-    The reading logged at t is the sensor's at t (1 + ``skew``) - ``delay_s`` + jitter. ``lattice_percent`` is the
-    step to which the reading is rounded. ``spike_share`` of the samples are off by about ``spike_percent`` to either
-    side. In a ``held_share`` of the samples the last one is repeated, in runs of about ``held_run``; in a
-    ``dropout_share`` the reading falls to the unloaded one, or with ``dropout_missing`` to nothing.
+    The reading logged at t is the sensor's at t (1 + ``skew``) - ``delay_s`` + jitter. ``lattice_percent`` is the step
+    to which the reading is rounded. ``spike_share`` of the samples are off by about ``spike_percent`` in either
+    direction. In a ``held_share`` of the samples the last one is repeated, in runs of about ``held_run``. In a
+    ``dropout_share`` the reading falls to the unloaded one, or is missing with ``dropout_missing``.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -44,20 +44,20 @@ class ReadingChannel:
     dropout_missing: bool = False
 
     def times(self, true_s: Array, rng: np.random.Generator) -> Array:
-        """When the sensor was in truth read (n,), from when the load was."""
+        """The true times (n,) at which the sensor was read, from the times at which the load was."""
         if self.delay_s == 0 and self.skew == 0 and self.jitter_s == 0:
             return true_s
         read_s = true_s * (1.0 + self.skew) - self.delay_s
         return read_s + self.jitter_s * rng.standard_normal(true_s.size) if self.jitter_s > 0 else read_s
 
     def hum(self, true_s: Array, span_v: float, rng: np.random.Generator) -> Array:
-        """Volts (n,) that the mains add; the phase is drawn."""
+        """Mains hum (n,) in volt; its phase is drawn."""
         phase = 2.0 * np.pi * (self.hum_hz * true_s + rng.uniform())
         wave = np.sin(phase) + self.hum_third_harmonic * np.sin(3.0 * phase + 1.0)
         return 0.01 * self.hum_percent * span_v * wave
 
     def logged(self, voltage_v: Array, unloaded_v: float, span_v: float, rng: np.random.Generator) -> Array:
-        """The channel (n,) as written to the file, NaN where missing, from the converter's."""
+        """The channel (n,) as written to the file, NaN where missing, from the converter's voltage."""
         v = voltage_v
         if self.lattice_percent > 0:
             step_v = 0.01 * self.lattice_percent * span_v
@@ -77,9 +77,9 @@ class ReadingChannel:
 
 
 def runs(size: int, share: float, mean_run: float, rng: np.random.Generator) -> Mask:
-    """True (n,) in runs of geometric length, ``share`` of the samples in the mean.
+    """Mask (n,) of runs of geometric length, covering ``share`` of the samples on average.
 
-    The uniform numbers behind a run's place do not depend on ``share``: a larger one adds runs and moves none.
+    The random numbers that place a run do not depend on ``share``: a larger one adds runs and moves none.
     """
     starts = rng.random(size) < min(share / mean_run, 1.0)
     lengths = rng.geometric(1.0 / mean_run, size)

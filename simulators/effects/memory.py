@@ -1,4 +1,4 @@
-"""A state that turns over with the way gone, compiled: for senses of motion that change gradually."""
+"""A compiled state that reverses gradually along the path travelled: a direction of motion that changes smoothly."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smartshoe.arrays import Array
 
 @njit(cache=True)
 def follow(step: Array, width: Array, start: float, out: Array) -> None:
-    """Fill ``out`` (n,) with s, ds = (sgn(dx) - s) |dx|/``width``, exact for each ``step`` and width (n,)."""
+    """Fill ``out`` (n,) with s, ds = (sgn(dx) - s) |dx|/``width``, exact for each ``step`` and ``width`` (n,)."""
     s = start
     for i in range(step.size):
         if step[i] != 0.0:

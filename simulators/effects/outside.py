@@ -1,9 +1,9 @@
-"""Outside the catalogue: what no block of a diagnosis has, so that it must be called unexplained.
+"""Effects outside the catalogue: no block of a diagnosis has them, so that it must report them as unexplained.
 
 Before the wall: a lightly damped mode between plate and tube (*resonance*), a tube that some cycles pinch
-(*intermittent pinch*), a plate that seats anew in each cycle (*random seating*), a wall that snaps over and back
-(*snap-through*). In the sensor: a *gain step*, a *slow sine* of gain, *telegraph noise*, *draughts* that cool or
-warm the die at random moments and let it recover.
+(*intermittent pinch*), a plate that seats differently in each cycle (*random seating*), a wall that snaps over and back
+(*snap-through*). In the sensor: a *gain step*, a *slow sine* of gain, *telegraph noise*, *draughts* that cool or warm
+the die at random moments and let it recover.
 """
 
 from __future__ import annotations
@@ -17,16 +17,17 @@ from pydantic import Field
 from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive, Share
 from smartshoe.arrays import Array, Index
 
-CYCLE_BEGINS = 0.02  # of full scale
+CYCLE_BEGINS = 0.02  # of full scale: load at which a cycle begins
 
 
 @dataclass(frozen=True, slots=True)
 class Odd:
-    """Oddities of the unit. Fractions are of full-scale load; ``seed`` draws which cycles they strike.
+    """Effects of the unit outside the catalogue. Fractions are of full-scale load; ``seed`` draws the affected cycles.
 
-    ``resonance`` is how much of the mode's own swing reaches the tube; ``pinch`` of the load above ``pinch_from`` is
-    lost in a ``pinch_share`` of the cycles; ``seating`` is the standard deviation of the gain from cycle to cycle;
-    ``snap`` is the load that a snapped wall no longer passes on, from ``snap_up`` until it falls to ``snap_down``.
+    ``resonance`` is the share of the mode's own oscillation that reaches the tube. ``pinch`` of the load above
+    ``pinch_from`` is lost in a ``pinch_share`` of the cycles. ``seating`` is the standard deviation of the gain from
+    cycle to cycle. ``snap`` is the load that a snapped wall does not transmit, from ``snap_up`` until the load falls to
+    ``snap_down``.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -45,7 +46,7 @@ class Odd:
 
 @dataclass
 class OddState:
-    """What the oddities remember between calls."""
+    """The memory of these effects between calls."""
 
     swing: Array
     cycle: int = 0
@@ -59,7 +60,7 @@ def fresh(session: int) -> OddState:
 
 
 def _cycles(load_n: Array, full_scale_n: float, state: OddState) -> Array:
-    """The number (n,) of the load cycle of each sample; it rises where a load begins."""
+    """The number (n,) of the load cycle of each sample; it increases where a load begins."""
     loaded = load_n > CYCLE_BEGINS * full_scale_n
     begins = loaded & ~np.concatenate([[state.in_cycle], loaded[:-1]])
     cycle = state.cycle + np.cumsum(begins)
@@ -69,7 +70,7 @@ def _cycles(load_n: Array, full_scale_n: float, state: OddState) -> Array:
 
 
 def _drawn(odd: Odd, cycle: Array, what: int, normal: bool) -> Array:
-    """A random number (n,) for each cycle: uniform on 0 to 1 or standard normal."""
+    """A random number (n,) per cycle: uniform on 0 to 1 or standard normal."""
     numbers, place = np.unique(cycle, return_inverse=True)
     draws = []
     for number in numbers:
@@ -79,14 +80,14 @@ def _drawn(odd: Odd, cycle: Array, what: int, normal: bool) -> Array:
 
 
 def strike(odd: Odd, load_n: Array, rate_hz: float, full_scale_n: float, state: OddState) -> Array:
-    """The load (n,) in N after the oddities, from the plate's (n,) at ``rate_hz``; ``state`` carries on."""
+    """The load (n,) in N after these effects, from the plate's (n,) at ``rate_hz``; updates ``state``."""
     acting = load_n
     if load_n.size == 0:
         return acting
     if odd.resonance > 0:
         from scipy.signal import lfilter
 
-        # Bilinear second-order mode, prewarped at its own frequency; its swing is the output less the input.
+        # Bilinear second-order mode, prewarped at its own frequency; its oscillation is output minus input.
         w = np.tan(np.pi * odd.resonance_hz / rate_hz)
         z = odd.resonance_damping
         a = np.array([1 + 2 * z * w + w * w, 2 * (w * w - 1), 1 - 2 * z * w + w * w])
@@ -113,7 +114,7 @@ def strike(odd: Odd, load_n: Array, rate_hz: float, full_scale_n: float, state: 
 
 @dataclass(frozen=True, slots=True)
 class SensorOddities:
-    """Oddities of the sensor, in percent of reading (gain) or of its range (zero), by the session's own clock."""
+    """Effects of the sensor outside the catalogue, in percent of reading (gain) or of range (zero), by session time."""
 
     __pydantic_config__ = STRICT_KEYS
     gain_step_percent: Finite = 0.0
@@ -129,20 +130,20 @@ class SensorOddities:
 
     @property
     def is_on(self) -> bool:
-        """Whether anything happens."""
+        """Whether any of them is on."""
         return any((self.gain_step_percent, self.slow_sine_percent, self.telegraph_percent, self.draught_percent))
 
     def gain(self, time_s: Array) -> Array:
-        """Factor (n,) on the reading."""
+        """Factor (n,) by which the reading is multiplied."""
         gain = 1.0 + 0.01 * self.gain_step_percent * (time_s >= self.gain_step_at_s)
         phase = 2.0 * np.pi * (time_s / self.slow_sine_period_s + self.slow_sine_phase)
         return np.asarray(gain + 0.01 * self.slow_sine_percent * np.sin(phase))
 
     def zero(self, time_s: Array, rng: np.random.Generator) -> Array:
-        """Fraction (n,) of the range that is added."""
+        """Offset (n,) of the reading as a fraction of the range."""
         zero = np.zeros(time_s.size)
         if self.telegraph_percent > 0:
-            # About zero: a level of its own would be an offset.
+            # Centred on zero: its mean would be an offset.
             zero += 0.01 * self.telegraph_percent * (moments(time_s, self.telegraph_dwell_s, rng)[0] % 2 - 0.5)
         if self.draught_percent > 0:
             number, since_s, size = moments(time_s, self.draught_every_s, rng)
@@ -152,9 +153,10 @@ class SensorOddities:
 
 
 def moments(time_s: Array, mean_s: float, rng: np.random.Generator) -> tuple[Index, Array, Array]:
-    """Random moments (Poisson, ``mean_s`` apart).
+    """Random moments (Poisson, ``mean_s`` apart on average).
 
-    Returns how many have passed at each time, the time since the last, and for each a size of either sign, 0.5 to 1.5.
+    Returns how many have passed at each time, the time since the last one, and for each a random size of 0.5 to 1.5
+    with either sign.
     """
     start_s, span_s = float(time_s[0]), float(time_s[-1] - time_s[0])
     count = int(span_s / mean_s * 2 + 20)

@@ -1,9 +1,9 @@
-"""Wall: more relaxation than the one arm of the paper's standard linear solid.
+"""Wall: relaxation beyond the one arm of the paper's standard linear solid.
 
-*Second relaxation*: a Maxwell arm with an Eyring dashpot, whose viscosity falls with stress:
-q' = (width/tau) sinh((e - q)/width); one exponential only for small strain. *Power-law creep*: a spring-pot
-sigma = E D^alpha e between two times, as a dense ladder of Maxwell arms (Mainardi 2010, ch. 3):
-t^-alpha = 1/Gamma(alpha) int tau^-alpha exp(-t/tau) dtau/tau.
+*Second relaxation*: a Maxwell arm with an Eyring dashpot, whose viscosity falls with stress: q' = (width/tau) sinh((e -
+q)/width); a single exponential only for small strain. *Power-law creep*: a spring-pot sigma = E D^alpha e between two
+times, as a dense ladder of Maxwell arms (Mainardi 2010, ch. 3): t^-alpha = 1/Gamma(alpha) int tau^-alpha exp(-t/tau)
+dtau/tau.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class PowerLawCreepParameters:
     exponent: Annotated[float, Field(gt=0.02, lt=0.98)] = 0.3
 
     def arms(self) -> tuple[Array, Array]:
-        """Stiffness in N/m and rate in 1/s of each of the ladder's arms (none where it is off)."""
+        """Stiffness in N/m and rate in 1/s of each arm of the ladder; empty where it is off."""
         if self.stiffness == 0.0:
             return np.zeros(0), np.zeros(0)
         tau_s = np.geomspace(SHORTEST_S, LONGEST_S, ARMS)

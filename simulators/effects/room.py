@@ -1,4 +1,4 @@
-"""Around the unit: the room's temperature, logged beside the reading, and a neighbour with a load of its own."""
+"""The unit's surroundings: the room's temperature, logged beside the reading, and a neighbour with its own load."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Room:
     thermometer_noise_k: NotNegative = 0.02
 
     def warmer_k(self, time_s: Array) -> Array:
-        """Temperature (n,) above the start."""
+        """Temperature (n,) in K above that at the start."""
         if not (self.drift_k_per_s or self.warming_k or self.swing_k):
             return np.zeros(time_s.size)
         swing = self.swing_k * np.sin(2.0 * np.pi * time_s / self.swing_period_s)
@@ -37,11 +37,10 @@ class Room:
 
 @dataclass(frozen=True, slots=True)
 class NeighbourUnit:
-    """A second unit whose load has nothing to do with the machine's, logged as ``neighbour``.
+    """A second unit whose load is independent of the machine's, logged as ``neighbour``.
 
-    Its pressure comes and goes in pushes of random size about ``period_s`` apart, the largest to ``highest_mbar``.
-    ``cross_talk`` of it adds to the sensor's, seen through ``lag_s``, and only what is above the share ``from_share``
-    of the highest.
+    It is pressed with random strength about every ``period_s``, at most to ``highest_mbar``. ``cross_talk`` of its
+    pressure adds to the sensor's, seen through ``lag_s``, and only the part above ``from_share`` of the highest.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -54,7 +53,7 @@ class NeighbourUnit:
     from_share: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
     def added_pa(self, neighbour_pa: Array, rate_hz: float) -> Array:
-        """What of the neighbour's pressure (n,) at ``rate_hz`` the sensor feels beside its own, in Pa."""
+        """Pressure (n,) in Pa that the neighbour's pressure (n,) at ``rate_hz`` adds to the sensor's own."""
         felt = neighbour_pa
         if self.from_share > 0:
             felt = np.maximum(felt - 100.0 * self.highest_mbar * self.from_share, 0.0)

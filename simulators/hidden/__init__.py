@@ -1,1 +1,1 @@
-"""Units with an effect that the engine does not know of."""
+"""Units with effects hidden from the diagnosis: test cases with known truths."""

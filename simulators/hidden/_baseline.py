@@ -1,9 +1,9 @@
-"""What a refitted first-order baseline leaves of a reading: the measure of an effect's strength.
+"""Residual of a reading after refitting a first-order baseline: the measure of an effect's strength.
 
-A plain refit of its own, apart from smartshoe's: the reading as load, load through one lag, and a constant, linear
-but for the pole, which is searched on a grid and then refined. The lag's part is not negative, as in a standard
-linear solid whose arm is passive (eq. 2-4 of Chinimilli 2016: the static gain is the larger one), so that heat of the
-gas is no relaxation.
+A simple fit, independent of smartshoe's own: the reading from load, load through one lag, and a constant. It is linear
+except for the pole, which is searched on a grid and then refined. The lag's coefficient is not negative, as in a
+standard linear solid with a passive arm (eq. 2-4 of Chinimilli 2016: the static gain is the larger one), so that heat
+of the gas does not pass for relaxation.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from scipy.signal import lfilter
 from smartshoe.arrays import Array
 from smartshoe.kernels.blas import on_one_thread
 
-SLOWEST, FASTEST = 0.005, 30.0  # 1/s, the poles that are tried
+SLOWEST, FASTEST = 0.005, 30.0  # 1/s, range of the poles that are tried
 GRID = 14
 POLE_TOLERANCE = 1e-4  # relative
 
 
 def lagged(load_n: Array, step_s: float, pole: float) -> Array:
-    """``load_n`` (n,) through 1/(s/pole + 1), linear between samples, settled at its first value."""
+    """``load_n`` (n,) through 1/(s/pole + 1), linear between samples, starting in equilibrium with its first value."""
     z = pole * step_s
     keep, mean = np.exp(-z), -np.expm1(-z) / z
     start = [(1.0 - (1.0 - mean)) * load_n[0]]
@@ -30,7 +30,7 @@ def lagged(load_n: Array, step_s: float, pole: float) -> Array:
 
 @on_one_thread
 def residual(load_n: Array, reading: Array, step_s: float, *, constant: bool = True) -> Array:
-    """What is left (n,) of ``reading`` (n,), any unit, NaN where missing, after the best baseline; NaN there too."""
+    """Residual (n,) of ``reading`` (n,) after the best baseline, in the same unit; NaN where the reading is missing."""
     present = np.isfinite(reading)
     whole = bool(present.all())
     fixed = np.column_stack([load_n, np.ones(load_n.size)] if constant else [load_n])

@@ -1,13 +1,13 @@
 """A simulated machine whose unit has further laws of effects (`simulators.hidden.effects._law`) in its chain.
 
 A law of the wall or of the air is solved in balance with the unit's standard linear solid, at a step of 2 ms, by
-iterating on whole records: x = H(u), u = load - stress(x) - pressure(x, y)/(1 + k1 x0^2/nRT), y = x + pressure. What
-it asks for is then a change of the load and of the pressure, interpolated onto the machine's own step, so that it
-lives beside whatever the machine's options switch on. *Left out*: of another effect in the wall it feels nothing,
-which is of the order of the product of both.
+iterating on whole records: x = H(u), u = load - stress(x) - pressure(x, y)/(1 + k1 x0^2/nRT), y = x + pressure. The
+result is a change of the load and of the pressure, interpolated to the machine's own step, so that it combines with the
+effects that the machine's options switch on. *Left out*: it does not feel other effects in the wall, which is an error
+of the order of the product of both.
 
-A first law, which options switch on, departs as d(warp(load)), d what the unit has with the effect less what it has
-without.
+A first law, which options switch on, departs by d(warp(load)), where d is the unit's output with the effect minus that
+without it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SETTLED = 1e-6  # of full scale
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """One further law as it is given to a unit."""
+    """A further law as applied to a unit, with its amount and parameters."""
 
     law: Law
     amount: float
@@ -48,7 +48,7 @@ class Given:
     seed: int = 0
 
     def acts(self, signal: Array, at: Surroundings) -> Array:
-        """What `Law.act` returns, fed with what the departure makes of ``signal`` (n,) or of the time."""
+        """The result of `Law.act`, with the departure applied to ``signal`` (n,) or to the time."""
         if self.amount == 0.0 and self.law.place in ("load", "reading", "log"):
             return signal
         if self.law.bends == "time":
@@ -64,7 +64,7 @@ class Given:
 
 @dataclass(frozen=True, eq=False)
 class Departed:
-    """A first law that departs: the options that switch it on, and the warp of what it feels."""
+    """A first law with a departure: the options that switch it on, and the warp of its input."""
 
     options: Options
     bends: str
@@ -73,18 +73,18 @@ class Departed:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """All that the machine's own options do not switch on."""
+    """The effects of a unit that the machine's own options do not switch on."""
 
     given: tuple[Given, ...] = ()
     departed: tuple[Departed, ...] = ()
 
     def at(self, *places: str) -> list[Given]:
-        """The laws that act there."""
+        """The laws that act at the given places."""
         return [one for one in self.given if one.law.place in places]
 
 
 class LawfulBladder(Bladder):
-    """A bladder with further laws before and in it."""
+    """A bladder with further laws that act before and inside it."""
 
     def __init__(self, inner: SimulatedBladder, chain: Chain, subject: Subject, options: Options) -> None:
         self.inner, self.parameters, self._chain, self._subject = inner, inner.parameters, chain, subject
@@ -105,7 +105,7 @@ class LawfulBladder(Bladder):
             without.reset()
 
     def press(self, load_n: Array, sample_rate_hz: float) -> Array:
-        """Gauge pressure (n,) in Pa; a law's memory begins anew with each call, as each recording is one."""
+        """Gauge pressure (n,) in Pa; a law's memory starts anew with each call, since each is one recording."""
         acting_n, added_pa = np.asarray(load_n, dtype=float), np.zeros(load_n.size)
         if self._chain.at("load", "stress", "gas", "leak"):
             change, further = self._laws(acting_n / FULL_SCALE_N, sample_rate_hz)
@@ -119,7 +119,7 @@ class LawfulBladder(Bladder):
         return np.asarray(pressure_pa + added_pa)
 
     def _laws(self, load: Array, rate_hz: float) -> tuple[Array, Array]:
-        """The change of load and the further pressure (n,), shares of full scale."""
+        """The change of load and the additional pressure, both (n,) and as shares of full scale."""
         time_s = np.arange(load.size) / rate_hz
         coarse_s = np.arange(0.0, time_s[-1] + LAW_STEP_S, LAW_STEP_S)
         f = np.interp(coarse_s, time_s, load)
@@ -138,7 +138,7 @@ class LawfulBladder(Bladder):
 
 
 def balanced(laws: Sequence[Given], acting: Array, at: Surroundings, subject: Subject) -> tuple[Array, Array]:
-    """Load (n,) that the plain unit must feel, and pressure (n,) beside its own, with ``laws`` in balance."""
+    """Load (n,) to apply to the plain unit, and pressure (n,) to add to its own, with ``laws`` in balance."""
     stiff = subject.k1 * X_OVER_NRT
     at_once = (1.0 + stiff) / (1.0 + stiff + subject.k2 * X_OVER_NRT)
     relaxes_s = subject.c / subject.k2 / at_once
@@ -176,7 +176,7 @@ def _bladder(plain: Options, more: Options) -> SimulatedBladder:
 
 
 class LawfulSensor(Sensor):
-    """A sensor with further laws before its lag and noise."""
+    """A sensor with further laws that act before its lag and noise."""
 
     def __init__(self, inner: SimulatedHdiSensor, chain: Chain, subject: Subject) -> None:
         self.inner, self.parameters, self._chain, self._subject = inner, inner.parameters, chain, subject
@@ -208,7 +208,7 @@ class LawfulSensor(Sensor):
 
     @property
     def white_v(self) -> Array:
-        """As the sensor's own."""
+        """The white noise (n,) in volt that the sensor added to the last reading."""
         return self.inner.white_v
 
     def reset(self) -> None:
@@ -222,7 +222,10 @@ class LawfulSensor(Sensor):
         return self.inner.to_pressure_pa(reading_v)
 
     def read(self, pressure_pa: Array, sample_rate_hz: float, warmer_k: Array | float = 0.0) -> Array:
-        """The reading (n,) in volt; ``load`` (n,) is the plate's, a share of full scale, for laws that ask for it."""
+        """The reading (n,) in volt.
+
+        ``load`` (n,) must hold the plate's load as a share of full scale, for laws that need it.
+        """
         full_pa = 100.0 * self._subject.full_scale_mbar
         y = np.asarray(pressure_pa) / full_pa
         time_s = np.arange(y.size) / sample_rate_hz
@@ -243,12 +246,12 @@ class LawfulSensor(Sensor):
 
 
 def machine_of(options: Options, seed: int) -> SimulatedInstron:
-    """The machine with these options, its noise fixed by ``seed``."""
+    """The machine with these options, with noise that ``seed`` determines."""
     return provider.open_machine("instron", options, np.random.default_rng([seed, 2]))
 
 
 def lawful_machine(options: Options, seed: int, chain: Chain, subject: Subject) -> SimulatedInstron:
-    """The machine, its unit with the laws of ``chain``; those of the log act in `recorded` alone."""
+    """The machine whose unit has the laws of ``chain``, except those of the log, which `recorded` applies."""
     machine = machine_of(options, seed)
     unit = machine.specimen
     if not isinstance(unit.bladder, SimulatedBladder):
@@ -261,7 +264,7 @@ def lawful_machine(options: Options, seed: int, chain: Chain, subject: Subject) 
 
 
 class _Felt:
-    """The bladder, telling the sensor's laws which load acts."""
+    """The bladder; passes the acting load on to the sensor's laws."""
 
     def __init__(self, bladder: LawfulBladder, sensor: LawfulSensor) -> None:
         self._bladder, self._sensor = bladder, sensor
@@ -283,7 +286,7 @@ class _Felt:
 def recorded(
     options: Options, protocols: Sequence[Protocol], seed: int, chain: Chain, subject: Subject
 ) -> tuple[Recording, ...]:
-    """One recording a protocol, each a session of its own."""
+    """One recording per protocol, each a session of its own."""
     with lawful_machine(options, seed, chain, subject) as machine:
         return tuple(
             logged(machine.run(protocol), chain, subject, number) for number, protocol in enumerate(protocols, start=1)
@@ -291,7 +294,7 @@ def recorded(
 
 
 def logged(recording: Recording, chain: Chain, subject: Subject, number: int) -> Recording:
-    """The recording after the laws of load cell and log."""
+    """The recording with the laws of load cell and log applied."""
     laws = chain.at("tare", "log")
     if not laws:
         return recording

@@ -1,4 +1,4 @@
-"""Load histories for hiding effects, beyond the paper's two: what a diagnosis may be given or may ask for."""
+"""Load histories for hidden effects, beyond the paper's two: those a diagnosis may be given or may ask for."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def _triangles(peaks_n: list[float], rate_n_per_s: float, rest_s: float) -> list
 
 
 def rates(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """Three triangles at each rate of the paper; ``other``: the rates in another order, a little lower."""
+    """Three triangles at each rate of the paper; with ``other``, slightly lower rates in another order."""
     order = rng.permutation(DYNAMIC_RATES_N_PER_S) if other else DYNAMIC_RATES_N_PER_S
     peak_n = 0.9 * PEAK_N if other else PEAK_N
     return list(dynamic_protocol([float(r) for r in order], peak_n=peak_n, repeats=3, rest_s=4.0).segments)
 
 
 def rates_and_holds(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """The rates, then a minute's hold at three loads and a minute's idleness."""
+    """The rates, then a hold of a minute at three loads and an idle minute."""
     segments = rates(rng, other)
     for load_n in (650.0, 150.0, 350.0) if other else (200.0, 500.0, 800.0):
         segments += _hold(load_n, 60.0, 15.0)
@@ -46,7 +46,7 @@ def rates_and_holds(rng: np.random.Generator, other: bool) -> list[Segment]:
 
 
 def static(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """The paper's staircase; ``other``: its loads in another order."""
+    """The paper's staircase; with ``other``, its loads in another order."""
     loads = np.arange(50.0, 801.0, 50.0)
     return list(static_protocol([float(x) for x in (rng.permutation(loads) if other else loads)]).segments)
 
@@ -57,7 +57,7 @@ def single_rate(rng: np.random.Generator, other: bool) -> list[Segment]:
 
 
 def shuffled(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """Triangles at mixed rates to loads in random order, so that earlier maxima and cycles part."""
+    """Triangles at mixed rates to loads in random order, so that effects of earlier maxima and of cycles differ."""
     segments = [Segment("rest", 0.0, 3.0)]
     for load_n in rng.permutation(np.repeat(np.arange(100.0, 801.0, 100.0), 3)):
         ramp_s = float(load_n) / float(rng.choice(DYNAMIC_RATES_N_PER_S))
@@ -66,7 +66,7 @@ def shuffled(rng: np.random.Generator, other: bool) -> list[Segment]:
 
 
 def long_hold(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """Five minutes at one load and as long at none, then three triangles."""
+    """Five minutes at one load, five minutes unloaded, then three triangles."""
     return [
         Segment("rest", 0.0, 10.0),
         *_hold(400.0 if other else 600.0, 300.0, 300.0),
@@ -116,13 +116,13 @@ def minor_loops(rng: np.random.Generator, other: bool) -> list[Segment]:
 
 
 def idle(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """Two minutes of nothing, three triangles, two minutes of nothing."""
+    """Two minutes unloaded, three triangles, two minutes unloaded."""
     triangles = _triangles([PEAK_N] * 3, 200.0, 4.0)
     return [Segment("rest", 0.0, 120.0), *triangles, Segment("rest", 0.0, 120.0)]
 
 
 def staircase(rng: np.random.Generator, other: bool) -> list[Segment]:
-    """Eight levels of the paper's static protocol; ``other``: seven between them, in another order."""
+    """Eight levels of the paper's static protocol; with ``other``, seven levels between them in another order."""
     loads = np.arange(100.0, 801.0, 100.0)
     levels = rng.permutation(loads[:-1] + 50.0) if other else loads
     return list(static_protocol([float(x) for x in levels], rate_n_per_s=100.0, approach_s=2.0).segments)
@@ -201,12 +201,12 @@ PROTOCOLS: dict[str, Callable[[np.random.Generator, bool], list[Segment]]] = {
 
 
 def build(name: str, rng: np.random.Generator, other: bool = False) -> Protocol:
-    """The named protocol; ``other`` is its variant for holding out."""
+    """The named protocol; ``other`` selects its variant for hold-out recordings."""
     return Protocol(name, tuple(PROTOCOLS[name](rng, other)))
 
 
 def never_unloaded(protocol: Protocol, floor_n: float, before_s: float = 60.0) -> Protocol:
-    """The protocol over a load that is never left, after ``before_s`` under it (what is before a record begins)."""
+    """The protocol on top of a permanent load, after ``before_s`` under that load (before the record begins)."""
     share = 1.0 - floor_n / max(protocol.peak_load_n, floor_n)
     lifted = tuple(
         Segment("hold" if s.kind == "rest" else s.kind, floor_n + share * s.load_n, s.duration_s)
@@ -216,7 +216,7 @@ def never_unloaded(protocol: Protocol, floor_n: float, before_s: float = 60.0) -
 
 
 def begun_loaded(protocol: Protocol, floor_n: float, before_s: float = 60.0) -> Protocol:
-    """The protocol after ``before_s`` under a load that its first rest still has."""
+    """The protocol after ``before_s`` under a load, which is still applied during its first rest."""
     first, *rest = protocol.segments
     start = Segment("hold", floor_n, max(first.duration_s, 1.0)) if first.load_n == 0.0 else first
     return Protocol(protocol.name, (*_before(floor_n, before_s), start, Segment("ramp", 0.0, 1.0), *rest))

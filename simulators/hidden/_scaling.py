@@ -1,4 +1,4 @@
-"""Giving an effect the strength that is asked for: a search over its amount that measures what each trial leaves."""
+"""Gives an effect the requested strength: searches its amount, measuring the residual that each trial leaves."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ from smartshoe.protocol import Protocol
 
 Trial = Callable[[float], tuple[float, bool]]
 
-TOLERANCE = 0.02  # of the asked strength
+TOLERANCE = 0.02  # of the requested strength
 MOST_TRIALS = 24
 SILENT: Options = {"load_noise_n": 0.0, "extension_noise_m": 0.0, "daq": {"bits": 24}}
 
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """One effect as it was hidden.
+    """One hidden effect, with its parameters and strength.
 
-    ``parameters`` are the truth's own, by their place in the machine's options (``bladder.contact.gap_n``);
-    ``catalogue`` are those that an equation of the catalogue would have, as far as the two compare
-    (`simulators.hidden.effects`);
-    ``strength_percent_fs`` is the one reached, ``asked_percent_fs`` the one asked for; ``note`` says why where the
+    ``parameters`` are the truth's own, named by their place in the machine's options (``bladder.contact.gap_n``).
+    ``catalogue`` are those of the catalogue's equation, as far as the two are comparable (`simulators.hidden.effects`).
+    ``strength_percent_fs`` is the strength reached, ``asked_percent_fs`` the one requested; ``note`` says why where the
     two differ by more than a twentieth.
     """
 
@@ -46,7 +45,7 @@ class HiddenEffect:
 def scaled(
     effect: Hideable, asked: float, subject: Subject, protocol: Protocol, seed: int, logger: Options
 ) -> tuple[Options, HiddenEffect]:
-    """The machine options that give ``effect`` the ``asked`` strength, or the nearest that it can have."""
+    """The machine options that give ``effect`` the strength ``asked``, or the nearest possible one."""
     draws = effect.draw(np.random.default_rng([seed, zlib.crc32(effect.name.encode())]), subject)
 
     def options(amount: float) -> Options:
@@ -85,7 +84,7 @@ def _strength(
 
 
 def clipped_at_an_end(machine: SimulatedInstron) -> bool:
-    """Whether the sensor's output met an end of its range in the machine's last run."""
+    """Whether the sensor's output reached an end of its range in the machine's last run."""
     if machine.truth is None:
         return False
     sensor = machine.specimen.sensor.parameters
@@ -94,10 +93,10 @@ def clipped_at_an_end(machine: SimulatedInstron) -> bool:
 
 
 def search(strength: Trial, asked: float, effect: Hideable) -> tuple[float, float, str]:
-    """The amount for the ``asked`` strength, the strength reached, and a remark where they differ.
+    """The amount for the strength ``asked``, the strength reached, and a remark where they differ.
 
-    A secant in logarithms within the bracket of what was too weak and too strong; where even the largest amount is
-    too weak, a look at smaller ones, since a baseline may absorb much of a large effect.
+    A secant in logarithms within the bracket of too weak and too strong amounts. Where even the largest amount is too
+    weak, smaller ones are tried, since a baseline may absorb much of a large effect.
     """
     low, high = 0.0, effect.largest
     tried: list[tuple[float, float, bool]] = []
@@ -136,7 +135,7 @@ def search(strength: Trial, asked: float, effect: Hideable) -> tuple[float, floa
 
 
 def _secant(tried: list[tuple[float, float, bool]], asked: float) -> float:
-    """Where strength, a power of the amount between the last two trials, is as asked."""
+    """The amount of strength ``asked``, if strength is a power of the amount between the last two trials."""
     amount, found, _ = tried[-1]
     slope = 1.0
     if len(tried) > 1:

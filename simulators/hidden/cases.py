@@ -1,4 +1,4 @@
-"""A case of the bank: recordings of a unit with hidden effects under chosen laws, and the record of what is true."""
+"""A case of the bank: recordings of a unit with hidden effects under chosen laws, and the record of the truth."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from smartshoe.arrays import Array
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
 
-BEFORE_S = 60.0  # under the first load, before a record that starts loaded
-NUISANCES = (2, 4)  # from, below
-POLES = (1.0, 1.3)  # of the unit's own rate: a departure is measured beside the baseline and a small change of it
+BEFORE_S = 60.0  # time under the first load before a record that starts loaded
+NUISANCES = (2, 4)  # their number: lower bound, excluded upper bound
+POLES = (1.0, 1.3)  # times the unit's own rate: a small change of the baseline is not part of a departure
 
 
 @dataclass(frozen=True, eq=False)
 class HiddenLaw:
-    """One effect as it was hidden: under which law, how strong, how far from its own law's plain form.
+    """One hidden effect: its law, its strength, and how far it departs from the law's plain form.
 
-    ``departure`` is what the law without its warp leaves of it beside a baseline, as a share of its own size; None
-    where the law has none.
+    ``departure`` is the residual after fitting the law without its warp, and a baseline, as a share of the law's own
+    size; None where the law has no warp.
     """
 
     effect: Hideable
@@ -46,7 +46,7 @@ class HiddenLaw:
 
 @dataclass(frozen=True, eq=False)
 class BankCase:
-    """``recordings`` are to be fitted, ``hold_out`` to be judged on; ``truth`` says what is in them."""
+    """One case: ``recordings`` to fit, ``hold_out`` to judge the fit on, and ``truth`` about their content."""
 
     plan: Plan
     recordings: tuple[Recording, ...]
@@ -61,12 +61,12 @@ class BankCase:
 
     @property
     def chain(self) -> Chain:
-        """All further laws."""
+        """All further laws of the case."""
         return _joined([one.chain for one in self.hidden])
 
     @cached_property
     def noise_free_hold_out(self) -> tuple[Recording, ...]:
-        """Twins of ``hold_out`` without noise on load and reading."""
+        """Twins of the ``hold_out`` recordings without noise on load and reading."""
         fitted = len(self.recordings)
         return _cut(
             self.plan,
@@ -74,7 +74,7 @@ class BankCase:
         )
 
     def alone(self, number: int) -> tuple[Recording, ...]:
-        """The fitted recordings with hidden effect ``number`` alone, without noise."""
+        """The fitted recordings with only hidden effect ``number``, without noise."""
         one = self.hidden[number]
         options = merged(self.subject.options(), _logger(self.plan), SILENT, one.options)
         return _cut(self.plan, self._silent(options, one.chain, 0, len(self.recordings)))
@@ -84,7 +84,7 @@ class BankCase:
 
     @property
     def truth(self) -> dict[str, Any]:
-        """What is true of it, as JSON: what cannot be told apart is added by who can compute it."""
+        """The truth as a JSON object; which effects cannot be distinguished is added by the caller."""
         p = self.plan
         return {
             "schema": "smartshoe.hidden_case/1", "kind": p.kind, "index": p.index, "seed": p.seed,
@@ -116,7 +116,10 @@ def _as_catalogued(name: str) -> str:
 
 
 def conditions(p: Plan, subject: Subject) -> list[dict[str, Any]]:
-    """Tare, offset and clock that the case has beside its effects: not small, and true causes where named."""
+    """Tare, offset and delay of the case besides its effects.
+
+    They are not small, and count as true causes when named.
+    """
     found: list[dict[str, Any]] = []
     alike = [] if p.zero == "seen" else [True]
     if p.tare_n:
@@ -139,19 +142,19 @@ def conditions(p: Plan, subject: Subject) -> list[dict[str, Any]]:
 
 
 def case(kind: str, index: int) -> BankCase:
-    """Case ``index`` of ``kind`` (`simulators.hidden.plans.KINDS`): always the same."""
+    """Case ``index`` of ``kind`` (`simulators.hidden.plans.KINDS`); reproducible."""
     return make(plan(kind, index))
 
 
 def make(p: Plan) -> BankCase:
-    """The case that ``p`` plans."""
+    """The case that plan ``p`` describes."""
     rng = np.random.default_rng([p.seed, 2])
     protocols = _protocols(p)
     subject = drawn_subject(rng, None, protocols[0].duration_s, "second_relaxation" in p.effects)
     logger = _logger(p)
     hidden: list[HiddenLaw] = []
     planned = zip(p.effects, p.laws, p.asked_percent, p.departures, strict=True)
-    # The range goes with compression, and all other strengths with the range.
+    # The range depends on compression, and all other strengths depend on the range.
     for name, law, asked, departure in sorted(planned, key=lambda each: each[0] != "gas_compression"):
         one = _hide(p, ALL[name], law, asked, departure, subject, protocols[0], logger)
         hidden.append(one)
@@ -192,7 +195,7 @@ def _of_conditions(p: Plan) -> set[str]:
 
 
 def _beside(conditioned: Options, small: Sequence[Options]) -> Options:
-    """Conditions, but for what a nuisance has set already (of one family there is only one)."""
+    """The conditions without those that a nuisance already sets, since each family can occur only once."""
     return conditioned if not small else merged(conditioned, *small)
 
 
@@ -214,7 +217,7 @@ def _protocols(p: Plan) -> tuple[Protocol, ...]:
 
 
 def _cut(p: Plan, made: Sequence[Recording]) -> tuple[Recording, ...]:
-    """The recordings without what was before them."""
+    """The recordings without the time before the record begins."""
     if p.zero == "seen":
         return tuple(made)
     cut = [r.between(BEFORE_S, r.time_s[-1] + 1.0) for r in made]
@@ -222,7 +225,7 @@ def _cut(p: Plan, made: Sequence[Recording]) -> tuple[Recording, ...]:
 
 
 def _logged_channels(p: Plan, recording: Recording) -> Recording:
-    """Crosshead and command are in a share of the files only."""
+    """The recording, with crosshead and command kept only where the plan logs them."""
     dropped = [] if p.logs_displacement else ["displacement"]
     return recording.without(*dropped, *([] if p.logs_command else ["command"]))
 
@@ -242,7 +245,7 @@ def _hide(
     draw = effect.draw if law is None else law.draw
     rng = np.random.default_rng([p.law_seed, zlib.crc32(effect.name.encode())])
     draws, unit_warp, seed = draw(rng, subject), Warp.drawn(rng), int(rng.integers(2**31))
-    ranged = effect.name == "gas_compression" and law is None  # its size is the range itself
+    ranged = effect.name == "gas_compression" and law is None  # its amount is the range itself
     can_depart = (effect.bends if law is None else law.bends) is not None and not ranged
     bounded = (
         effect if law is None else replace(
@@ -284,7 +287,7 @@ def _hide(
         departs = departs_by(amount, size) if size else 0.0
         if departs <= MOST_DEPARTURE:
             break
-        size *= departure / departs  # a law that is not linear in its amount departs by more at the one that was found
+        size *= departure / departs  # the departure of a law that is not linear depends on its amount
     options, chain = placed(amount, size)
     return HiddenLaw(effect, name, asked, reached, departs if can_depart else None, options, chain, note)
 
@@ -297,7 +300,7 @@ def _pressed(p: Plan, options: Options, chain: Chain, subject: Subject, protocol
 
 
 def _departure(p, effect, placed, amount, size, subject, protocol, logger) -> float:  # type: ignore[no-untyped-def]
-    """What the law without its warp, at any amount, leaves of the law with it, as a share of its own."""
+    """The law's residual after fitting it without its warp, at any amount, as a share of its own size."""
     made = []
     for options, chain in (placed(amount, size), placed(amount, 0.0), ({}, Chain())):
         given = merged(subject.options(), logger, options, SILENT)

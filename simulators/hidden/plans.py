@@ -31,7 +31,7 @@ OUTSIDE = tuple(name for name, effect in ALL.items() if not effect.inside)
 PHYSICAL = tuple(name for name in INSIDE if ALL[name].family not in ("noise", "data"))
 LAWS = 3  # of each effect, in the rotation of `worlds`
 
-# Families of which small amounts imitate each other: hidden together in `alike` only, never the nuisance beside.
+# Families whose small amounts imitate each other: hidden together in `alike` only, and never used as nuisance.
 IMITATE = {
     "zero": {"leak", "relaxation", "tare"}, "leak": {"zero", "relaxation"}, "tare": {"zero"},
     "relaxation": {"gas_heat", "zero", "leak"}, "gas_heat": {"relaxation", "rate", "timing"},
@@ -39,7 +39,7 @@ IMITATE = {
     "hysteresis": {"asymmetry", "relaxation"}, "rate": {"gas_heat"}, "dead_band": {"static_curve", "zero", "tare"},
     "static_curve": {"dead_band", "saturation"}, "saturation": {"static_curve"}, "timing": {"gas_heat"},
 }  # fmt: skip
-# Of one family, and yet no laws of one thing: both may be there.
+# Effects of one family that are nevertheless different things: both may be present.
 ONE_FAMILY = (
     ("delay", "clock_drift"), ("delay", "sensor_lag"), ("clock_drift", "sensor_lag"), ("permanent_set", "warm_up"),
     ("permanent_set", "zero_drift"), ("mullins_softening", "cycle_conditioning"),
@@ -55,7 +55,7 @@ STRENGTHS = {
 }  # fmt: skip
 MOST_DEPARTURE = 0.4
 
-# What shows an effect, and tells it from its neighbours as far as a load history does: the first recording is of these.
+# Protocols that reveal an effect and distinguish it from similar ones; the first recording uses one of these.
 SHOWN_BY: dict[str, tuple[str, ...]] = {
     "second_relaxation": ("holds", "recovery"), "power_law_creep": ("holds", "recovery"),
     "linear_leak": ("recovery",), "orifice_leak": ("recovery",), "permanent_set": ("recovery", "holds"),
@@ -68,7 +68,7 @@ SHOWN_BY: dict[str, tuple[str, ...]] = {
     "zero_drift": ("idle", "recovery"), "warm_up": ("idle", "recovery"), "zero_offset": ("holds", "staircase"),
     "load_cell_tare": ("staircase", "rates"), "cross_talk": ("holds", "recovery"),
 }  # fmt: skip
-# Roughly, of each protocol.
+# Approximate duration of each protocol.
 LASTS_S = {
     "rates": 270.0, "shuffled": 230.0, "staircase": 240.0, "holds": 200.0, "mixed": 170.0, "walking": 100.0,
     "minor_loops": 110.0, "multisine": 135.0, "step": 80.0, "recovery": 290.0, "idle": 280.0, "single_rate": 135.0,
@@ -76,7 +76,7 @@ LASTS_S = {
 MOST_SAMPLES = 200_000
 PLAIN = ("rates", "shuffled", "staircase", "holds", "mixed")
 BESIDE = ("rates", "shuffled", "holds", "mixed", "staircase", "walking", "minor_loops")
-# Rests are what shows them, or the range's end.
+# Effects that show in rests, or at the end of the range.
 NEEDS_REST = frozenset({
     "dead_band", "zero_offset", "load_cell_tare", "permanent_set", "linear_leak", "orifice_leak", "mullins_softening",
 })  # fmt: skip
@@ -85,7 +85,7 @@ NEEDS_RATES = frozenset({"relaxation", "rate", "timing", "gas_heat", "hysteresis
 
 @dataclass(frozen=True)
 class Plan:
-    """One case before it is made. ``laws`` and ``departures`` are in the order of ``effects``."""
+    """The description of one case. ``laws`` and ``departures`` are in the order of ``effects``."""
 
     kind: str
     index: int
@@ -108,7 +108,7 @@ class Plan:
 
     @property
     def families(self) -> frozenset[str]:
-        """Of the effects, and of what imitates them."""
+        """The families of the effects, and those that imitate them."""
         return frozenset(_near({ALL[name].family for name in self.effects}))
 
 
@@ -118,7 +118,7 @@ def seeded(*key: object) -> int:
 
 
 def plan(kind: str, index: int) -> Plan:
-    """Case ``index`` of ``kind``: always the same. Raises `UsageError` for a kind that there is not."""
+    """Case ``index`` of ``kind``; reproducible. Raises `UsageError` for an unknown kind."""
     if kind not in KINDS or index < 0:
         raise UsageError(f"there is no case {index} of the kind {kind!r}: use 0 and up of one of {', '.join(KINDS)}")
     group = index // LAWS if kind == "worlds" else index
@@ -142,7 +142,7 @@ def plan(kind: str, index: int) -> Plan:
     if set(names) & NEEDS_REST:
         zero = "seen"
     rate = float(rng.choice([100.0, 100.0, 100.0, 49.0, 90.0, 200.0, 500.0, 1000.0]))
-    # A long recording at a high rate would be nothing but large.
+    # A long recording at a high rate would only be large.
     total_s = sum(LASTS_S.get(name, LASTS_S["rates"]) for name in (*fitted, *held)) + (
         0.0 if zero == "seen" else 60.0 * (len(fitted) + 1)
     )
@@ -166,7 +166,7 @@ def _names(kind: str, group: int, rng: np.random.Generator) -> tuple[str, ...]:
         return ()
     if kind in ("single", "outside", "worlds"):
         pool = {"single": INSIDE, "outside": OUTSIDE, "worlds": PHYSICAL}[kind]
-        # Every one once, in a drawn order, before any comes again.
+        # Each one once, in random order, before any is repeated.
         order = np.random.default_rng(seeded("order", kind, group // len(pool))).permutation(pool)
         return (str(order[group % len(pool)]),)
     if kind == "family":
@@ -178,7 +178,7 @@ def _names(kind: str, group: int, rng: np.random.Generator) -> tuple[str, ...]:
         near = _near(taken)
         if not names or (family in near - taken if kind == "alike" else family not in near):
             names.append(name)
-        elif kind == "alike" and near == taken:  # nothing imitates the first
+        elif kind == "alike" and near == taken:  # no family imitates the first one
             names.clear()
     return tuple(names)
 

@@ -1,8 +1,8 @@
-"""Hidden-effect cases: recordings of a unit that has exactly the asked effects, at an asked strength.
+"""Hidden-effect cases: recordings of a unit that has exactly the requested effects, at a requested strength.
 
-*Strength* is what an effect leaves behind once the first-order baseline is fitted again
-(`simulators.hidden._baseline`), on the noise-free reading: its root mean square in percent of the reading at full-scale
-load. Each effect is scaled alone, on the unit without the other effects and the nuisances.
+*Strength* is the residual of the noise-free reading after the first-order baseline is fitted again
+(`simulators.hidden._baseline`): its root mean square in percent of the reading at full-scale load. Each effect is
+scaled alone, on the unit without the other effects and the nuisances.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from smartshoe.recording import Recording
 
 NUISANCES = ("load_cell_tare", "zero_offset", "delay", "gain_drift", "contact_area", "mild_hysteresis")
 NUISANCE_PERCENT_FS = (0.03, 0.08)
-# A mild loop of another kind than the ones that are hidden: relays over two thresholds.
+# A mild loop of a kind that is never hidden: relays over two thresholds.
 _MILD_HYSTERESIS = Hideable(
     "mild_hysteresis", "hysteresis", "wall", "strength", "1", 0.002, 0.2,
     lambda a, d, s: {"bladder": {"hysteresis": {"strength": a, "half_width_n": 30.0}}},
@@ -33,11 +33,11 @@ _MILD_HYSTERESIS = Hideable(
 
 @dataclass(frozen=True, eq=False)
 class HiddenCase:
-    """What `hide` returns.
+    """The result of `hide`.
 
-    ``recordings`` are to be fitted, ``hold_out`` to be judged on. ``nuisances`` are small imperfections that every
-    recording has. ``noise_free`` are twins of ``recordings + hold_out`` without noise on load and reading, ``clean``
-    also without the effects (with the nuisances); both are simulated when first asked for.
+    ``recordings`` are to be fitted, ``hold_out`` to judge the fit on. ``nuisances`` are small imperfections of every
+    recording. ``noise_free`` are twins of ``recordings + hold_out`` without noise on load and reading; ``clean`` are
+    also without the effects, but with the nuisances. Both are simulated on first access.
     """
 
     recordings: tuple[Recording, ...]
@@ -54,12 +54,12 @@ class HiddenCase:
 
     @cached_property
     def noise_free(self) -> tuple[Recording, ...]:
-        """Twins without noise, with effects and nuisances."""
+        """Twins of all recordings without noise, but with effects and nuisances."""
         return _recorded(self.noise_free_options, self.protocols, self.seed)
 
     @cached_property
     def clean(self) -> tuple[Recording, ...]:
-        """Twins without noise and without the effects."""
+        """Twins of all recordings without noise and effects, but with nuisances."""
         return _recorded(self.clean_options, self.protocols, self.seed)
 
 
@@ -77,17 +77,17 @@ def hide(  # noqa: PLR0913 - a public verb
     sample_rate_hz: float = 100.0,
     unit: str | None = None,
 ) -> HiddenCase:
-    """Recordings of a unit that has the named effects (`simulators.hidden.effects.EFFECTS`), and what is true of it.
+    """Recordings of a unit that has the named effects (`simulators.hidden.effects.EFFECTS`), and the truth about it.
 
-    ``effects`` maps names to strengths in percent of full scale, or lists names of which ``strength_percent_fs``
-    gives the strength. ``protocol`` is a name of `simulators.hidden._protocols` or a protocol. What is None is drawn
-    from ``seed``: 0.1 to 0.3 % of noise, up to half of its variance coloured, two or three recordings, a unit of the
-    paper with its constants varied by a third and its arm up to eight times as strong. ``nuisances`` small
-    imperfections (0.03 to 0.08 %) are of no family that is hidden. ``hold_out`` recordings come last, with the
-    protocol's own variant of rates and loads. Raises `UsageError` for a name that is not known.
+    ``effects`` maps names to strengths in percent of full scale, or lists names, all of strength
+    ``strength_percent_fs``. ``protocol`` is a name of `simulators.hidden._protocols` or a protocol. Arguments that are
+    None are drawn from ``seed``: 0.1 to 0.3 % of noise, up to half of its variance coloured, two or three recordings,
+    and one of the paper's units with its constants varied by a third and its arm up to eight times as strong.
+    ``nuisances`` is the number of small imperfections (0.03 to 0.08 %), which are of no hidden family. ``hold_out``
+    recordings come last, with the protocol's variant of rates and loads. Raises `UsageError` for an unknown name.
     """
     asked = _asked(effects, strength_percent_fs)
-    # What is given does not change what is drawn for the rest.
+    # Given arguments do not change what is drawn for the others.
     rng = np.random.default_rng([seed, 1])
     count, noise, share = int(rng.integers(2, 4)), float(rng.uniform(0.1, 0.3)), float(rng.uniform(0.0, 0.5))
     count = count if recordings is None else recordings
@@ -100,7 +100,7 @@ def hide(  # noqa: PLR0913 - a public verb
 
     overlays: list[Options] = []
     found: list[HiddenEffect] = []
-    # The range goes with compression, and all other strengths with the range.
+    # The range depends on compression, and all other strengths depend on the range.
     for name in sorted(asked, key=lambda n: n != "gas_compression"):
         overlay, effect = scaled(EFFECTS[name], asked[name], subject, plans[0], seed, logger)
         overlays.append(overlay)
@@ -112,7 +112,7 @@ def hide(  # noqa: PLR0913 - a public verb
     small = [overlay for overlay, _ in annoyances.values()]
     noisy = merged({"load_noise_n": load_noise_n}, noise_options(noise, share, colour_s, {e.name for e in found}))
     clean = merged(subject.options(), logger, *small, SILENT)
-    # A hidden kind of noise lies over the base noise.
+    # A hidden kind of noise is added to the base noise.
     whole = merged(subject.options(), logger, *small, noisy, *overlays)
     made = _recorded(whole, plans, seed)
     fitted = len(made) - hold_out
@@ -158,11 +158,11 @@ def _protocols(protocol: str | Protocol, rng: np.random.Generator, fitted: int, 
 
 
 def drawn_subject(rng: np.random.Generator, unit: str | None, duration_s: float, strong_arm: bool) -> Subject:
-    """The unit; ``strong_arm``: beside a weak arm a second one is taken for it, and leaves little."""
+    """The unit; with ``strong_arm`` its arm is strong, since beside a weak one a second arm would pass for it."""
     names = sorted(presets.TABLE_1)
     drawn = names[int(rng.integers(len(names)))]
     vary = np.exp(rng.uniform(np.log(0.75), np.log(4 / 3), 3))
-    # Arms stronger than Table 1's, which Table 2's units ask for (docs/paper_audit.md).
+    # Arms stronger than Table 1's, as Table 2 requires (docs/paper_audit.md).
     vary[1:] *= np.exp(rng.uniform(*np.log((8.0, 24.0) if strong_arm else (1.0, 8.0))))
     if unit is not None:
         drawn, vary = unit, np.ones(3)
@@ -173,7 +173,7 @@ def drawn_subject(rng: np.random.Generator, unit: str | None, duration_s: float,
 
 
 def noise_options(noise: float, share: float, colour_s: float, hidden: set[str]) -> Options:
-    """White and coloured noise of the reading; a hidden kind of noise takes the coloured part's place."""
+    """White and coloured noise of the reading; a hidden kind of noise replaces the coloured part."""
     if hidden & {"coloured_noise", "heteroscedastic_noise"}:
         share = 0.0
     range_percent = SHARE_OF_RANGE * noise
@@ -197,7 +197,7 @@ def small_effects(
     free = [name for name in NUISANCES if known[name].family not in families]
     names = [str(name) for name in rng.permutation(free)[:count]]
     sizes = rng.uniform(*NUISANCE_PERCENT_FS, size=len(names))
-    # A nuisance delay stays within a sample, a nuisance drift brings no thermometer.
+    # A nuisance delay stays within a sample, and a nuisance drift adds no temperature channel.
     sample_s = 1.0 / logger["daq"]["sample_rate_hz"]
     small = {
         **known,

@@ -1,1 +1,1 @@
-"""What reads a plant: the sensor and its logger."""
+"""Simulated instruments that read a unit: the sensor and its logger."""

@@ -18,13 +18,13 @@ LARGEST_ERROR_V = 0.05  # absolute error of the 0-5 V inputs, myRIO-1900 specifi
 
 @dataclass(frozen=True, slots=True)
 class MyRioParameters:
-    """Converter and clock.
+    """Parameters of converter and clock.
 
-    Both ``..._error_v`` are a channel's absolute error in volt, or "drawn": uniform within +-50 mV at construction.
-    0, the default, is a channel that was zeroed before the test. Load: ``load_full_scale_n`` over the 5 V, zero load
-    at ``load_zero_v``, so that noise about zero is not clipped. The true time of sample k is
-    clock_offset_s + (k/sample_rate_hz)(1 + clock_skew) + jitter; the log says k/sample_rate_hz. ``reading`` is what
-    the sensor's channel alone suffers.
+    Both ``..._error_v`` are a channel's absolute error in volt, or "drawn": uniform within +-50 mV at construction. 0,
+    the default, is a channel that was zeroed before the test. Load: ``load_full_scale_n`` spans the 5 V, with zero load
+    at ``load_zero_v``, so that noise about zero is not clipped. The true time of sample k is clock_offset_s +
+    (k/sample_rate_hz)(1 + clock_skew) + jitter; the log says k/sample_rate_hz. ``reading`` holds the faults of the
+    sensor's channel alone.
     """
 
     sample_rate_hz: float = 100.0
@@ -46,12 +46,12 @@ class MyRioParameters:
 
     @property
     def newton_per_volt(self) -> float:
-        """Scale of the load channel."""
+        """Scale of the load channel in N per V."""
         return self.load_full_scale_n / self.full_scale_v
 
 
 class SimulatedMyRio:
-    """Samples voltages and loads at its own clock's ticks; the absolute errors are drawn once, here."""
+    """Samples voltages and loads at its own clock's ticks; absolute errors are drawn once, at construction."""
 
     def __init__(self, parameters: MyRioParameters, rng: np.random.Generator) -> None:
         self.parameters = parameters
@@ -63,7 +63,7 @@ class SimulatedMyRio:
         return float(self._rng.uniform(-LARGEST_ERROR_V, LARGEST_ERROR_V)) if error_v == "drawn" else float(error_v)
 
     def ticks(self, duration_s: float) -> tuple[Array, Array]:
-        """Times (n,) in s that the log says, and the true ones, for samples from 0 through ``duration_s``."""
+        """Logged times (n,) in s, and the true ones, of samples from 0 through ``duration_s``."""
         p = self.parameters
         logged_s = np.arange(int(np.floor(duration_s * p.sample_rate_hz + 1e-9)) + 1) / p.sample_rate_hz
         true_s = p.clock_offset_s + logged_s * (1.0 + p.clock_skew)
@@ -82,12 +82,12 @@ class SimulatedMyRio:
         return self.convert(self.parameters.load_zero_v + load_n / self.parameters.newton_per_volt, self.load_error_v)
 
     def to_load_n(self, voltage_v: Array) -> Array:
-        """Load (n,) in N by the nominal scale."""
+        """Load (n,) in N from the logged voltage (n,), by the nominal scale."""
         return (voltage_v - self.parameters.load_zero_v) * self.parameters.newton_per_volt
 
 
 def sampled(time_s: Array, sample_rate_hz: float, signal: Array) -> Array:
-    """``signal`` (m,), at k/``sample_rate_hz``, at the times ``time_s`` (n,): exact on its ticks, linear between."""
+    """``signal`` (m,), given at k/``sample_rate_hz``, at the times ``time_s`` (n,): exact on ticks, else linear."""
     place = time_s * sample_rate_hz
     nearest = np.rint(place)
     if np.all(np.abs(place - nearest) < 1e-6):

@@ -1,7 +1,7 @@
-"""What a scenario may say of a sensing unit and its logger; unknown keys and values out of bounds are errors.
+"""A scenario's options of a sensing unit and its logger; unknown keys and values out of bounds are errors.
 
 The bladder's options are `simulators.plant.bladder_parameters.BladderParameters` themselves; the instruments' are in
-the units that a person writes (mbar, percent) and become SI here.
+practical units (mbar, percent) and are converted to SI here.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MBAR_PA = 100.0
 
 
 def _absolute_error(value: object) -> float | str:
-    """A plain check instead of a union, so that pydantic's error names the key and nothing of its own."""
+    """A number or "drawn", checked here instead of by a union, so that pydantic's error names only the key."""
     if value == "drawn":
         return "drawn"
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_ERROR_V:
@@ -39,13 +39,13 @@ AbsoluteError = Annotated[
 
 
 class Options(BaseModel):
-    """A table of a scenario: an unknown key is an error."""
+    """A table of a scenario; an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid")
 
 
 class SensorOptions(Options):
-    """An HDI sensor; percentages are of the range."""
+    """Options of an HDI sensor; percentages are of the range."""
 
     range_mbar: Positive = 200.0
     noise_percent: NotNegative = 0.05
@@ -63,7 +63,7 @@ class SensorOptions(Options):
     wander: SensorOddities = SensorOddities()
 
     def parameters(self) -> HdiParameters:
-        """The same in SI."""
+        """These options in SI units."""
         return HdiParameters(
             range_pa=self.range_mbar * MBAR_PA,
             noise_fraction=self.noise_percent / 100.0,
@@ -83,7 +83,7 @@ class SensorOptions(Options):
 
 
 class DaqOptions(Options):
-    """A myRIO; see `simulators.instruments.daq.MyRioParameters`."""
+    """Options of a myRIO; see `simulators.instruments.daq.MyRioParameters`."""
 
     sample_rate_hz: Annotated[float, Field(gt=0, le=100_000)] = 100.0
     bits: Annotated[int, Field(ge=4, le=24)] = 12
@@ -97,31 +97,31 @@ class DaqOptions(Options):
     reading: ReadingChannel = ReadingChannel()
 
     def parameters(self) -> MyRioParameters:
-        """The same as the simulator takes it."""
+        """These options as the simulator's parameters."""
         return MyRioParameters(**dict(self))
 
 
 class TwinOptions(Options):
-    """A unit's own calibration in the bladder's place; see `simulators.instruments.twin`."""
+    """A unit's own calibration in place of the bladder; see `simulators.instruments.twin`."""
 
     twin: str
 
 
 class UnitOptions(Options):
-    """One unit of a shoe: what differs from its preset."""
+    """Options of one unit of a shoe: the changes to its preset."""
 
     bladder: BladderParameters
     sensor: SensorOptions
 
 
 def is_twin(options: Any) -> bool:
-    """Whether a unit's options ask for its twin: ``bladder = {twin = "unit.json"}``."""
+    """Whether a unit's options select its twin: ``bladder = {twin = "unit.json"}``."""
     bladder = options.get("bladder") if isinstance(options, dict) else None
     return isinstance(bladder, dict) and "twin" in bladder
 
 
 def with_preset(unit: Any, options: Any) -> Any:
-    """A unit's ``options`` with its preset's bladder and sensor under them; what is no table is left to pydantic.
+    """A unit's ``options`` laid over its preset's bladder and sensor; anything that is not a table is left to pydantic.
 
     Without ``effective_area_m2``, the area follows from the final k1 and range: 800 N at 85 % of the range.
     """
@@ -130,7 +130,7 @@ def with_preset(unit: Any, options: Any) -> Any:
     unit = str(unit)
     base, sensor = presets.bladder(unit), options.get("sensor", {})
     if is_twin(options) and isinstance(sensor, dict):
-        # Lag, membrane and offset are in what was fitted.
+        # Lag, membrane and offset are part of the fitted model.
         sensor = {"lag_s": 0.0, "bidirectional": True, **sensor}
         return {**options, "sensor": {"range_mbar": presets.sensor_range_pa(unit) / MBAR_PA, **sensor}}
     if isinstance(sensor, dict):
@@ -146,7 +146,7 @@ def with_preset(unit: Any, options: Any) -> Any:
 
 
 def _area_of(bladder: dict[str, Any], sensor: Any) -> float | None:
-    """The preset's rule for the area; None where the values it needs are wrong, which pydantic then says."""
+    """The preset's rule for the area; None where the values it needs are wrong, which pydantic then reports."""
     try:
         k1, range_mbar = float(bladder["k1"]), float(sensor["range_mbar"])
         x_over_nrt = float(bladder.get("x_over_nrt", X_OVER_NRT))

@@ -21,7 +21,7 @@ STAND_INS = {f"{side}_{meta}": f"{side}_heel" for side in ("left", "right") for 
 
 
 def sensor_range_pa(unit: str) -> float:
-    """100 mbar at the toe, 200 mbar elsewhere (Chinimilli 2016, Section II)."""
+    """The sensor's range in Pa: 100 mbar at the toe, 200 mbar elsewhere (Chinimilli 2016, Section II)."""
     return 10_000.0 if unit.endswith("toe") else 20_000.0
 
 
@@ -31,11 +31,11 @@ def effective_area_m2(k1: float, range_pa: float, x_over_nrt: float = X_OVER_NRT
 
 
 def bladder(unit: str) -> BladderParameters:
-    """A unit's bladder; a name that the paper does not have gets the left toe's constants."""
+    """A unit's bladder; names that the paper lacks get the left toe's constants."""
     k1, k2 = TABLE_1.get(STAND_INS.get(unit, unit), TABLE_1["left_toe"])
     return BladderParameters(k1, k2, effective_area_m2=effective_area_m2(k1, sensor_range_pa(unit)))
 
 
 def sensor(unit: str) -> HdiParameters:
-    """A unit's sensor."""
+    """A unit's sensor, with the range of its place."""
     return HdiParameters(range_pa=sensor_range_pa(unit))

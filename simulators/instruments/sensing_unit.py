@@ -1,4 +1,4 @@
-"""One unit of a shoe: what a foot or a testing machine presses."""
+"""One unit of a shoe, as pressed by a foot or a testing machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SensingUnit:
-    """A bladder, or a twin in its place, with its sensor: what the machine presses."""
+    """A bladder, or a twin in its place, together with its sensor."""
 
     name: str
     bladder: SimulatedBladder | SimulatedTwin

@@ -21,9 +21,9 @@ LOW_V, SPAN_V = 0.5, 4.0
 
 @dataclass(frozen=True, slots=True)
 class HdiParameters:
-    """A sensor: noise, margins and errors are fractions of ``range_pa`` (noise: standard deviation a sample).
+    """A sensor: noise, margins and errors are fractions of ``range_pa`` (noise: standard deviation per sample).
 
-    ``bidirectional`` is the kind that goes as far below zero gauge pressure as above, with zero at 2.5 V.
+    ``bidirectional`` is the kind whose range extends as far below zero gauge pressure as above, with zero at 2.5 V.
     ``second_lag_s`` is a slow port: two further poles, at this time constant and at a quarter of it.
     """
 
@@ -45,37 +45,37 @@ class HdiParameters:
 
     @property
     def unloaded_v(self) -> float:
-        """The output at zero gauge pressure."""
+        """The output in volt at zero gauge pressure."""
         return LOW_V + 0.5 * SPAN_V if self.bidirectional else LOW_V
 
     @property
     def span_v(self) -> float:
-        """From there to the range's end."""
+        """Volts from the output at zero gauge pressure to that at the end of the range."""
         return 0.5 * SPAN_V if self.bidirectional else SPAN_V
 
     @property
     def is_plain(self) -> bool:
-        """Whether lag, membrane, gain, zero and white noise are all there is."""
+        """Whether there are no effects besides lag, membrane, gain, zero and white noise."""
         effects = (self.curve, self.drift, self.limit, self.noise, self.wander)
         return self.second_lag_s == 0 and not any(effect.is_on for effect in effects)
 
 
 class SimulatedHdiSensor(Sensor):
-    """A sensor with lag, zero, gain and noise, whose membrane and output stage both have ends.
+    """A sensor with lag, zero, gain and noise, whose membrane and output stage are both limited.
 
-    The membrane does not go below zero gauge pressure; the output stage clips at ``over_range_fraction`` beyond
-    either end of the range, noise included, so that a saturated reading repeats exactly.
+    The membrane does not go below zero gauge pressure; the output stage clips at ``over_range_fraction`` beyond either
+    end of the range, noise included, so that a saturated reading repeats exactly.
     """
 
     def __init__(self, parameters: HdiParameters, rng: np.random.Generator) -> None:
         self.parameters = parameters
         self._rng = rng
-        # Streams of their own, so that switching one effect on leaves every other number as it was.
+        # Separate random streams, so that switching one effect on does not change the others' numbers.
         self._noise_rng, self._wander_rng = rng.spawn(2)
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: the lag's state and the time since the start (noise goes on)."""
+        """Reset the lag's state and the time since the start; the noise continues."""
         self._lagged_pa = 0.0
         self._last_pa = 0.0
         self._time_s = 0.0
@@ -84,24 +84,24 @@ class SimulatedHdiSensor(Sensor):
 
     @property
     def range_pa(self) -> tuple[float, float]:
-        """From zero gauge pressure, or from as far below, to the range."""
+        """From zero gauge pressure, or for a bidirectional sensor from minus the range, to the range."""
         p = self.parameters
         return -p.range_pa if p.bidirectional else 0.0, p.range_pa
 
     @property
     def proof_pressure_pa(self) -> float:
-        """The pressure in Pa that it stands without harm."""
+        """The highest pressure in Pa that does not damage the sensor."""
         return self.parameters.proof_pressure_pa
 
     def describe(self) -> ChannelDescription:
-        """The reading in volt."""
+        """The reading's channel, in volt."""
         return ChannelDescription("reading", "voltage", VOLT, (LOW_V, LOW_V + SPAN_V))
 
     def read(self, pressure_pa: Array, sample_rate_hz: float, warmer_k: Array | float = 0.0) -> Array:
-        """The reading (n,) in volt for the pressure (n,) in Pa; the lag's memory carries on.
+        """The reading (n,) in volt for the pressure (n,) in Pa; the lag's memory continues from the last call.
 
-        ``warmer_k`` (n,) is the room's temperature above that of the session's start. ``white_v`` (n,) then holds
-        the part of the reading that is white noise, which must not be averaged where it is read between two steps.
+        ``warmer_k`` (n,) is the room's temperature above that at the session's start. Afterwards ``white_v`` (n,) holds
+        the part of the reading that is white noise, which must not be averaged where the reading is interpolated.
         """
         p = self.parameters
         pressure = np.asarray(pressure_pa, dtype=float)
@@ -129,7 +129,7 @@ class SimulatedHdiSensor(Sensor):
         return np.asarray(p.unloaded_v + p.span_v * share)
 
     def _lag(self, pressure: Array, sample_rate_hz: float) -> Array:
-        """Through the sensor's lag and its slow port: exact for a pressure that is linear within a step."""
+        """The pressure through the sensor's lag and its slow port: exact where it is linear within a step."""
         p = self.parameters
         lagged = pressure
         if p.lag_s > 0:
@@ -145,7 +145,7 @@ class SimulatedHdiSensor(Sensor):
         return lagged
 
     def _disturbed(self, share: Array, time_s: Array, rate_hz: float, warmer_k: Array | float) -> Array:
-        """The reading's share (n,) of the range, with all but offset, drift and white noise."""
+        """The reading (n,) as a share of the range, with all effects except offset, drift and white noise."""
         p = self.parameters
         share = p.curve(share) * (1.0 + p.gain_error_fraction)
         share = share * p.drift.gain(time_s, warmer_k) * p.wander.gain(time_s)
@@ -156,13 +156,16 @@ class SimulatedHdiSensor(Sensor):
         return share
 
     def to_pressure_pa(self, reading_v: Array) -> Array:
-        """Pressure (n,) in Pa by the nominal characteristic."""
+        """Pressure (n,) in Pa from the reading (n,) in volt, by the nominal characteristic."""
         p = self.parameters
         return (np.asarray(reading_v, dtype=float) - p.unloaded_v) * (p.range_pa / p.span_v)
 
 
 def _first_order(signal: Array, steps: float, output: float, last: float) -> tuple[Array, float]:
-    """Through a lag of ``steps`` samples, linear within a step, from its ``output`` and ``last`` input; its end too."""
+    """The signal through a lag of ``steps`` samples, linear within a step, and the final output.
+
+    It starts from the lag's ``output`` and the ``last`` input.
+    """
     from smartshoe.kernels.linear_filter import linear_filter
 
     z = 1.0 / steps

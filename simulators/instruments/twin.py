@@ -1,8 +1,8 @@
-"""A specimen made of a unit's own calibration: the extended model that a diagnosis fitted, pressed by the machine.
+"""A specimen made from a unit's own calibration: the extended model that a diagnosis fitted, pressed by the machine.
 
-It is no truth: it holds what was fitted and nothing else, and every recording of it says so (``is_twin``). This is
-the one module here that uses the fitted models; nothing may be judged against it but the very data it was fitted to.
-*Left out:* all that the fit did not name, noise above all; the crosshead's share of the tube is Boyle's for the
+It is not a truth: it contains what was fitted and nothing else, and every recording of it says so (``is_twin``). This
+is the one module here that uses the fitted models; only the very data it was fitted to may be judged against it. *Left
+out:* everything that the fit did not name, above all noise; the crosshead's share of the tube is Boyle's for the
 pressure that is shown, sensor faults included.
 """
 
@@ -22,7 +22,7 @@ AMBIENT_PA = 101_325.0
 
 
 class TwinParameters:
-    """What a machine asks of a bladder before it presses it: its scale."""
+    """The scale of a bladder, which a machine needs before it presses it."""
 
     def __init__(self, bladder: TwinBladder) -> None:
         self.effective_area_m2 = bladder.effective_area_m2
@@ -35,7 +35,7 @@ class TwinParameters:
 
 
 class SimulatedTwin(Bladder):
-    """`smartshoe.models.twin.TwinBladder` with what a simulated machine reads off a specimen."""
+    """`smartshoe.models.twin.TwinBladder` with the attributes that a simulated machine reads from a specimen."""
 
     def __init__(self, bladder: TwinBladder, source: str) -> None:
         self._bladder = bladder
@@ -44,14 +44,14 @@ class SimulatedTwin(Bladder):
         self.reset()
 
     def reset(self) -> None:
-        """Back to rest."""
+        """Return to rest."""
         self._bladder.reset()
         self.deformation = np.zeros(0)
 
     def press(self, load_n: Array, sample_rate_hz: float) -> Array:
         """Gauge pressure (n,) in Pa under ``load_n`` (n,) in N; see `TwinBladder.press`.
 
-        ``deformation`` (n,) then holds the compressed share of the volume.
+        Afterwards ``deformation`` (n,) holds the compressed share of the volume.
         """
         pressure_pa = self._bladder.press(load_n, sample_rate_hz)
         self.deformation = pressure_pa / np.maximum(pressure_pa + AMBIENT_PA, 0.1 * AMBIENT_PA)
@@ -61,7 +61,7 @@ class SimulatedTwin(Bladder):
 def twin_of(path: str | Path) -> SimulatedTwin:
     """The twin of the unit that the calibration at ``path`` describes.
 
-    Raises `InputError` naming the file where it is no calibration, or one of a reading that is no pressure.
+    Raises `InputError` naming the file where it is no calibration, or where its reading is not a pressure.
     """
     try:
         return SimulatedTwin(TwinBladder(Calibration.load(path).model()), Path(path).name)

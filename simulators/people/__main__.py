@@ -1,4 +1,4 @@
-"""``python -m simulators.people``: what the simulated people do at each speed, measured on their true loads."""
+"""``python -m simulators.people``: what the simulated people do at each speed, measured from their true loads."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def table() -> str:
 
 
 def pace(sensors: bool, duration_s: float) -> str:
-    """How fast a walk is made, block by block."""
+    """How fast a walk is simulated, block by block."""
     begun = time.perf_counter()
     strikes = 0
     for block in blocks(None, None, duration_s, np.random.default_rng(1), sensors=sensors):

@@ -1,8 +1,8 @@
-"""From moves to contacts: heel strikes, stances and how hard each is, so that momentum balances.
+"""From activities to contacts: heel strikes, stances and the load of each, such that momentum balances.
 
-The contacts take turns. Each carries body weight for the time that is its own, half of the time between its
-neighbours' heel strikes; what one stance takes too much the next ones take less. So the mean total vertical force over
-whole strides is body weight, as it must be of a body that neither rises nor sinks in the long run.
+The contacts alternate. Each carries body weight for its own time, half of the time between its neighbours' heel
+strikes; if one stance takes too much, the next ones take less. So the mean total vertical force over whole strides is
+body weight, as it must be for a body that neither rises nor sinks in the long run.
 
 *Left out:* correlation of stride times over many strides, fatigue, stumbling, kerbs and stairs.
 """
@@ -20,16 +20,19 @@ from simulators.people.shape import COLUMNS, Outside, table
 from smartshoe.arrays import Array, Index
 from smartshoe.recording import REGIONS
 
-PHASE_SD = {"walk": 0.020, "run": 0.030}  # of the shift of a region's course, as a share of stance
-STANCE_OF_STRIDE_CV = 0.3  # what a stance varies beside its stride, over the stride time's own variation
-TURN_LEAN = 0.35  # of a metatarsal's load that a tight turn moves to the other
-TURN_TIME = 0.10  # longer stance of the inner foot in a tight turn, as a share
+PHASE_SD = {"walk": 0.020, "run": 0.030}  # sd of the time shift of a region's load, as a share of stance
+STANCE_OF_STRIDE_CV = 0.3  # variation of stance independent of the stride, over the stride time's variation
+TURN_LEAN = 0.35  # share of a metatarsal's load that a tight turn moves to the other one
+TURN_TIME = 0.10  # by this share the inner foot's stance is longer in a tight turn
 SHORTEST_BOTH = 0.02  # of a stride: least double support or flight
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Contacts of both feet in order of time: all (m,), ``foot`` 0 left and 1 right, ``move`` the row of the moves."""
+    """Contacts of both feet in order of time: all (m,).
+
+    ``foot`` is 0 left, 1 right, ``move`` the index of the activity.
+    """
 
     strike_s: Array
     foot: Index
@@ -43,7 +46,7 @@ def steps(
     first_foot: int,
     rng: np.random.Generator,
 ) -> Steps:
-    """Heel strikes and stances of ``moves`` (move, begin and end in s), one after the other without a stop."""
+    """Heel strikes and stances of ``moves`` (move, begin and end in s), one after another without a stop."""
     strikes: list[Array] = []
     feet: list[Index] = []
     owners: list[Index] = []
@@ -52,7 +55,7 @@ def steps(
         stride_s = 120.0 / move.cadence(person)
         count = max(int(1.3 * (end_s - now) / (0.5 * stride_s)) + 12, 2)
         side = (foot + np.arange(count)) % 2
-        # The step from left to right is the shorter where the right's stance is the longer: equal double supports.
+        # With a longer right stance the step from left to right is shorter, which keeps double supports equal.
         lean = 0.5 * move.resolved_stance_share * (person.time_asymmetry + TURN_TIME * -move.turning)
         mean_s = stride_s * np.where(side == 0, 0.5 - lean, 0.5 + lean)
         noise_s = stride_s * move.resolved_stride_time_cv / np.sqrt(2.0) * rng.standard_normal(count)
@@ -75,12 +78,12 @@ def _stance_s(
     cv = np.array([move.resolved_stride_time_cv for move in moves])[owner]
     turning = np.array([move.turning for move in moves])[owner]
     runs = np.array([isinstance(move, Run) for move in moves])[owner]
-    # A contact lasts as its own time does, so that a late step makes it longer and not harder.
+    # A contact's duration scales with its own time, so that a late step makes it longer rather than harder.
     stride_s = 2.0 * _own_time_s(strike_s) if strike_s.size > 1 else own_s
     sign = np.where(side == 1, 1.0, -1.0)
     share = share * (1.0 + 0.5 * sign * (person.time_asymmetry - TURN_TIME * turning))
     stance_s = stride_s * share * (1.0 + STANCE_OF_STRIDE_CV * cv * rng.standard_normal(side.size))
-    # The other foot must have come before this one leaves (walking), or must not have come yet (running).
+    # The other foot must have landed before this one lifts (walking), or must not have landed yet (running).
     other_s = 0.5 * own_s
     other_s[:-1] = np.diff(strike_s)
     least = np.where(runs, 0.1 * stride_s, other_s + SHORTEST_BOTH * stride_s)
@@ -96,14 +99,14 @@ def contacts(
     outside: Outside,
     rng: np.random.Generator,
 ) -> tuple[Stances, Stances]:
-    """The left and the right foot's contacts for the steps, in newton."""
+    """The contacts of the left and the right foot for the steps, with loads in N."""
     tables: list[Array] = []
     rows = np.empty((len(moves), 2), dtype=np.intp)
     for number, move in enumerate(moves):
         for foot, inwards in enumerate((-1.0, 1.0)):
             rows[number, foot] = len(tables)
             kind = "run" if isinstance(move, Run) else "walk"
-            # Turning left, the body leans left: on to the left foot's outer, the right foot's inner edge.
+            # Turning left, the body leans left: onto the left foot's outer and the right foot's inner edge.
             tables.append(table(kind, move.speed_m_per_s, coverage, outside, TURN_LEAN * move.turning * inwards))
     kind_of = rows[made.move, made.foot]
     count = made.strike_s.size
@@ -126,7 +129,7 @@ def contacts(
 
 
 def _own_time_s(strike_s: Array) -> Array:
-    """Half of the time (m,) between the heel strikes before and after each: together the whole time."""
+    """Half of the time (m,) in s between the heel strikes before and after each; together they cover the whole time."""
     if strike_s.size == 1:
         return np.full(1, 0.5)
     gap_s = np.diff(strike_s)
@@ -134,7 +137,7 @@ def _own_time_s(strike_s: Array) -> Array:
 
 
 def _shared(person: Person, made: Steps, load_cv: Array, rng: np.random.Generator) -> Array:
-    """Each contact's share (m,) of what is its own: the person's asymmetry, and noise that the next ones take back."""
+    """Each contact's load (m,) relative to its due share: the person's asymmetry, and noise that later ones balance."""
     noise = 0.5 * load_cv * rng.standard_normal(load_cv.size)
     given = noise - np.concatenate([[0.0], noise[:-1]])
     return np.asarray((1.0 + 0.5 * person.load_asymmetry * np.where(made.foot == 1, 1.0, -1.0)) * (1.0 + given))

@@ -1,11 +1,11 @@
-"""Measured vertical forces in the place of simulated ones: plates' files, spread over the regions of two feet.
+"""Measured vertical forces instead of simulated ones: files of force plates, spread over the regions of two feet.
 
-Read are BMClab's files (Duarte, CC BY 4.0): ``.forces`` (several plates, whose vertical axis is FY), OpenSim's ``.mot``
-(``R_`` and ``L_ground_force_vy``), C3D (plates of types 2 and 4) and two columns ``Time[s]  GRF[N]`` (both feet on one
+It reads BMClab's files (Duarte, CC BY 4.0): ``.forces`` (several plates, whose vertical axis is FY), OpenSim's ``.mot``
+(``R_`` and ``L_ground_force_vy``), C3D (plates of types 2 and 4) and two columns ``Time[s] GRF[N]`` (both feet on one
 plate, half for each).
 
-*Left out:* which region truly bore what, as plates do not tell: regions follow the shares of
-`simulators.people.shape`. A plate that two feet met is not taken apart.
+*Left out:* which region really bore which load, as plates do not tell: regions follow the shares of
+`simulators.people.shape`. A plate under both feet is not separated.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from smartshoe.errors import InputError
 from smartshoe.recording import REGIONS
 from smartshoe.signals.masks import runs_of
 
-LEVEL_N = 10.0  # a plate bears
-LONGEST_STANCE_S = 1.3  # longer, the foot stands
+LEVEL_N = 10.0  # above this, a plate is loaded
+LONGEST_STANCE_S = 1.3  # a longer contact is standing
 SHORTEST_STANCE_S = 0.08
-RUNS_FROM = 1.6  # times body weight: the peak of a foot that runs
-REFERENCE_SPEED = {"walk": 1.3, "run": 2.68}  # m/s, whose shares of the regions are taken
+RUNS_FROM = 1.6  # body weights: a higher peak means running
+REFERENCE_SPEED = {"walk": 1.3, "run": 2.68}  # m/s, at which the regions' shares are taken
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Feet on plates: ``measured_s`` (n,), ``foot_n`` (n, 2) left and right, ``regions_n`` (n, 2, 5) as in `COLUMNS`.
 
-    It is asked for its loads as a plan is.
+    It provides loads in the same way as a plan.
     """
 
     person: Person
@@ -47,7 +47,7 @@ class Measured:
 
     @property
     def duration_s(self) -> float:
-        """How long the plates were read."""
+        """Duration of the measurement in s."""
         return float(self.measured_s[-1] - self.measured_s[0])
 
     def loads_n(self, time_s: Array) -> Array:
@@ -69,10 +69,11 @@ def measured(
     first_foot: str = "right",
     body_weight_n: float | None = None,
 ) -> Measured:
-    """The feet of a plates' file. Plates that were met in turn are taken for ``first_foot`` and the other in turn.
+    """The feet in a force-plate file.
 
-    Without ``body_weight_n`` it is the stances' mean impulse over the mean time from strike to strike, or the median of
-    what a plate bears for long. Raises `InputError` for a file that is none of these.
+    Plates stepped on in turn are assigned to ``first_foot`` and the other alternately. The default of ``body_weight_n``
+    is the stances' mean impulse over the mean time between strikes, or the median of what a plate bears for long.
+    Raises `InputError` for a file of none of these formats.
     """
     time_s, forces, named = _read(Path(path))
     if named:
@@ -96,7 +97,7 @@ def measured(
         for first, last in own:
             part = slice(first, last)
             begin_s, end_s = float(time_s[first]), float(time_s[last - 1])
-            # A contact that the record cuts off lasts as long as the others do.
+            # A contact cut off by the end of the record is given the duration of the others.
             if last == time_s.size:
                 end_s = max(end_s, begin_s + usual_s)
             elif first == 0:
@@ -156,7 +157,7 @@ def _of_c3d(path: Path) -> tuple[Array, Array]:
             elif kind != 2:
                 raise InputError(f"{path} has a plate of type {kind}: 2 and 4 are read")
             first, last = (int(one) for one in platform["ZERO"]["value"])
-            # What the person does to the plate is the other way round of what the plate does to him.
+            # The force on the plate is opposite to the force of the plate on the person.
             vertical.append(np.median(channels[2, first - 1 : last]) - channels[2])
     except (OSError, RuntimeError, KeyError, IndexError, ValueError) as error:
         raise InputError(f"{path} is no C3D file with force plates: {error}") from error
@@ -167,7 +168,7 @@ def _of_c3d(path: Path) -> tuple[Array, Array]:
 def _stances(force_n: Array, time_s: Array) -> list[tuple[int, int]]:
     found = []
     for first, last in zip(*runs_of(force_n > LEVEL_N), strict=True):
-        # Down to zero on either side, so that the load does not begin with a step.
+        # Extended to zero on either side, so that the load does not begin with a step.
         while first > 0 and 0.0 < force_n[first - 1] <= force_n[first]:
             first -= 1
         while last < force_n.size and 0.0 < force_n[last] <= force_n[last - 1]:
@@ -202,7 +203,7 @@ def _usual_s(time_s: Array, spans: list[list[tuple[int, int]]]) -> float:
 
 
 def _shares(time_s: Array, span_s: tuple[float, float], peak: float, coverage: float, outside: Outside) -> Array:
-    """Each column's share (n, 5) of the force of a contact with this span and peak in body weights; together one."""
+    """Each column's share (n, 5) of the force of a contact with this span and peak in body weights; the sum is one."""
     lasts_s = span_s[1] - span_s[0]
     if lasts_s > LONGEST_STANCE_S:
         flat = [coverage * FLAT[region] for region in REGIONS]

@@ -1,7 +1,7 @@
-"""What speed does to gait: smooth laws through published means of adults, each with its source.
+"""The effect of speed on gait: smooth laws through published means of adults, each with its source.
 
 They are means over people, good to some 5 %; a person's own numbers go into `simulators.people.person.Move`. "After"
-says that the trend is the source's and the numbers are rounded or joined here, not read from its tables.
+means that the trend is the source's, while the numbers are rounded or interpolated here, not read from its tables.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ LONGEST_RUNNING_STANCE = 0.47
 
 
 def walking_cadence(speed_m_per_s: float, walk_ratio_m_min: float = WALK_RATIO_M_MIN) -> float:
-    """Steps per minute: speed is step length times cadence, their ratio a constant (after Sekiya et al. 1996).
+    """Steps per minute: speed is step length times cadence, and their ratio is constant (after Sekiya et al. 1996).
 
-    Below some 1.03 m/s (98 steps a minute) people take longer steps than that (Murakami and Otaka 2017): slow walking
-    is some steps a minute too quick here.
+    Below some 1.03 m/s (98 steps a minute) people take longer steps than that (Murakami and Otaka 2017), so the cadence
+    of slow walking is some steps a minute too high here.
     """
     return math.sqrt(60.0 * speed_m_per_s / walk_ratio_m_min)
 
@@ -49,9 +49,9 @@ def load_cv(speed_m_per_s: float) -> float:
 
 
 def modulation(speed_m_per_s: float) -> float:
-    """How much deeper walking's valley and how much higher its peaks are than at 1.3 m/s, as a share.
+    """How much deeper walking's valley and higher its peaks are than at 1.3 m/s, as a share.
 
-    It makes a first peak of 0.95 body weights at 1 m/s, 1.03 at 1.3, 1.25 at 2 and a valley of 0.74, 0.71 and 0.53: the
-    trend of Nilsson and Thorstensson 1989, somewhat weaker. Below 1 m/s the course stays as it is.
+    It gives a first peak of 0.95 body weights at 1 m/s, 1.03 at 1.3, 1.25 at 2 and a valley of 0.74, 0.71 and 0.53: the
+    trend of Nilsson and Thorstensson 1989, somewhat weaker. Below 1 m/s the shape does not change.
     """
     return min(max(0.45 * (speed_m_per_s - 1.3), -0.15), 0.5)

@@ -1,4 +1,4 @@
-"""Stances: a foot's contacts one after the other, and the loads that they make at any times one asks for."""
+"""The contacts of a foot, one after another, and their loads at any given times."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ WARPS = np.linspace(-LARGEST_WARP, LARGEST_WARP, 49)
 
 
 def smooth_step(share: Array) -> Array:
-    """From 0 to 1 while the share (n,) goes from 0 to 1, with slope and curvature zero at both ends."""
+    """Rises from 0 to 1 as the share (n,) does, with zero slope and curvature at both ends."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 @dataclass(frozen=True, eq=False)
 class Stances:
-    """A foot's contacts, in order and apart from each other.
+    """A foot's contacts, in order and without overlap.
 
     ``begin_s``, ``duration_s`` and ``amplitude_n`` (m,); ``kind`` (m,) is the row of ``tables`` (k, `PHASES` + 1, 5);
     ``height`` and ``warp`` (m, 5) are each region's own factor of load and shift of phase, x + warp 4x(1 - x).
-    ``fade_s`` (m, 2) begins and ends a fade where walking comes from or goes to standing: ``fades`` (m,) is 1 where
-    the load fades in, -1 where it fades out, 0 else.
+    ``fade_s`` (m, 2) is begin and end of a fade where walking follows or precedes standing: ``fades`` (m,) is 1 where
+    the load fades in, -1 where it fades out, 0 otherwise.
     """
 
     begin_s: Array
@@ -71,7 +71,7 @@ class Stances:
 
 
 def mean_heights(tables: Sequence[Array]) -> Array:
-    """Mean over stance (k, warps, 5) of each table's columns, each warped by each of `WARPS`."""
+    """Mean over stance (k, warps, 5) of each table's columns, for each of `WARPS`."""
     stance = (np.arange(PHASES) + 0.5) / PHASES
     bow = 4.0 * stance * (1.0 - stance)
     grid = np.linspace(0.0, 1.0, PHASES + 1)
@@ -87,7 +87,7 @@ def mean_heights(tables: Sequence[Array]) -> Array:
 
 
 def mean_load(means: Array, kind: Index, height: Array, warp: Array) -> Array:
-    """Mean load (m,) over each stance at amplitude one; ``means`` as from `mean_heights`."""
+    """Mean load (m,) over each stance at amplitude one; ``means`` as returned by `mean_heights`."""
     place = (np.clip(warp, WARPS[0], WARPS[-1]) - WARPS[0]) / (WARPS[1] - WARPS[0])
     before = np.clip(place.astype(np.intp), 0, WARPS.size - 2)
     part = place - before

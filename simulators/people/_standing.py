@@ -1,8 +1,8 @@
-"""Standing: half of body weight on each foot, sway, and rising on tiptoe with the push that the rise takes.
+"""Standing: half of body weight on each foot, sway, and rising on tiptoe with the push that this takes.
 
-Shares of flat standing after Cavanagh et al. 1987 (heel 60.5 %, midfoot 7.8 %, forefoot 28.1 %, toes 3.6 %), the
-forefoot on its two coils. The total is body weight plus mass times the acceleration of the body, which rises and
-falls only on tiptoe: over a rise its mean is body weight.
+Shares of flat standing after Cavanagh et al. 1987 (heel 60.5 %, midfoot 7.8 %, forefoot 28.1 %, toes 3.6 %), with the
+forefoot on its two coils. The total is body weight plus mass times the acceleration of the body, which rises and falls
+only on tiptoe: over a rise its mean is body weight.
 
 *Left out:* breathing and heart beat (below 1 % of body weight), steps taken to keep balance, handrails.
 """
@@ -25,19 +25,19 @@ HEEL_RISE_M = 0.06
 GRAVITY_M_PER_S2 = 9.81
 SWAY_BAND_HZ = (0.05, 1.2)
 WAVES = 24
-SIDEWAYS = 0.5  # of the sway between heel and forefoot, between left and right
+SIDEWAYS = 0.5  # sway between left and right, relative to that between heel and forefoot
 
 
 @dataclass(frozen=True, eq=False)
 class Sway:
-    """Slow coloured noise of unit spread: waves of random phase with a spectrum that falls with frequency."""
+    """Slow coloured noise of unit variance: waves of random phase with a spectrum that falls with frequency."""
 
     frequency_hz: Array
     phase: Array
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Sway:
-        """A sway of its own."""
+        """A sway with random phases."""
         low, high = SWAY_BAND_HZ
         return cls(low * (high / low) ** rng.random(WAVES), rng.uniform(0.0, 2.0 * np.pi, WAVES))
 
@@ -53,7 +53,7 @@ class Sway:
 
 @dataclass(frozen=True, slots=True)
 class Lift:
-    """A stay on tiptoe: the heels leave from ``begin_s`` and are down again at ``end_s``."""
+    """A stay on tiptoe: the heels rise from ``begin_s`` on and are down again at ``end_s``."""
 
     begin_s: float
     end_s: float
@@ -61,12 +61,12 @@ class Lift:
     sway_cv: float
 
     def height(self, time_s: Array) -> Array:
-        """The rise's share (n,), 0 flat to 1 on the toes."""
+        """The height (n,) of the heels as a share: 0 flat, 1 on the toes."""
         up = smooth_step((time_s - self.begin_s) / self.rise_s)
         return np.asarray(up * (1.0 - smooth_step((time_s - self.end_s + self.rise_s) / self.rise_s)))
 
     def push(self, time_s: Array) -> Array:
-        """The acceleration (n,) upwards in m/s^2: the second derivative of `height` times the heel's rise."""
+        """The upward acceleration (n,) in m/s^2: the second derivative of `height` times the heel's rise."""
 
         def bend(share: Array) -> Array:
             s = np.clip(share, 0.0, 1.0)
@@ -79,7 +79,7 @@ class Lift:
 
 @dataclass(frozen=True, eq=False)
 class StandingStay:
-    """A stay on both feet. Left and right each come down within ``on_s`` (2, 2) and leave within ``off_s`` (2, 2)."""
+    """A period on both feet. Left and right each land within ``on_s`` (2, 2) and lift within ``off_s`` (2, 2)."""
 
     person: Person
     coverage: float
@@ -91,7 +91,7 @@ class StandingStay:
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """When anything is loaded."""
+        """First and last time in s at which anything is loaded."""
         return float(self.on_s.min()), float(self.off_s.max())
 
     def loads_n(self, time_s: Array) -> Array:
@@ -118,13 +118,13 @@ class StandingStay:
         return loads
 
     def _shares(self, sway: Array, raised: Array) -> Array:
-        """Shares (n, 5) of a foot's load: the coils', and what passes beside them."""
+        """Shares (n, 5) of a foot's load: those of the coils, and the part that passes beside them."""
         heel = np.clip(FLAT["heel"] * sway, 0.0, 1.0)
         toe = np.clip(RAISED["toe"] * (2.0 - sway), 0.0, 1.0)
         made = np.empty((sway.size, len(COLUMNS)))
         for column, region in enumerate(REGIONS):
             flat = heel if region == "heel" else (1.0 - heel) * FLAT[region] / (1.0 - FLAT["heel"])
-            # On the toes the sway is one of toe against the balls of the foot.
+            # On tiptoe the sway is between the toe and the balls of the foot.
             up = toe if region == "toe" else (1.0 - toe) * RAISED[region] / (1.0 - RAISED["toe"])
             made[:, column] = self.coverage * (flat * (1.0 - raised) + up * raised)
         made[:, -1] = 1.0 - self.coverage
@@ -132,7 +132,7 @@ class StandingStay:
 
 
 def _within(time_s: Array, on_s: Array, off_s: Array) -> Array:
-    """How much of its load (n,) a foot carries: it comes within ``on_s`` and goes within ``off_s``."""
+    """The share (n,) of its load that a foot carries: it lands within ``on_s`` and lifts within ``off_s``."""
 
     def ramp(span: Array) -> Array:
         if span[1] <= span[0]:

@@ -1,4 +1,4 @@
-"""A trial: a person moves in two shoes; what truly happened, and what the units recorded of it."""
+"""A trial: a person moves in two shoes; the true loads and events, and what the units recorded."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ ADC_BITS = 12
 class Trial:
     """A trial, or a block of a long one.
 
-    ``time_s`` (n,); ``total_n`` maps "left" and "right" to the foot's true vertical force (n,) in N, with what passes
-    beside the coils; ``unit_n`` maps "left_toe", ... to the true load (n,) on that unit; ``events`` are the true
-    ones, in order; ``recording`` is what was recorded, in mbar through bladder, sensor and converter, or in N.
+    ``time_s`` (n,); ``total_n`` maps "left" and "right" to the foot's true vertical force (n,) in N, including the part
+    beside the coils; ``unit_n`` maps "left_toe", ... to the true load (n,) on that unit; ``events`` are the true ones,
+    in order; ``recording`` is what was recorded: in mbar through bladder, sensor and converter, or in N.
     """
 
     person: Person
@@ -51,7 +51,7 @@ def trial(
     rng: np.random.Generator | None = None,
     **settings: Any,
 ) -> Trial:
-    """A whole trial: `blocks` in one piece, with the same settings."""
+    """A whole trial: the `blocks` with the same settings joined."""
     return next(iter(blocks(person, activity, duration_s, rng, block_s=np.inf, **settings)))
 
 
@@ -112,7 +112,7 @@ def blocks(  # noqa: PLR0913 - a public verb
         sampler = Sampler(sensing_units(unit_rng, sides, _drifting(units, drift, made.duration_s)), ADC_BITS, unit_rng)
     size = count if np.isinf(block_s) else max(2, round(block_s * sample_rate_hz))
     for start in range(0, count, size):
-        # One sample before the block, so that no event falls between two blocks.
+        # One sample before the block, so that no event is lost between two blocks.
         time_s = np.arange(max(start - 1, 0), min(start + size, count)) / sample_rate_hz
         loads = made.loads_n(time_s)
         events = [
@@ -152,7 +152,7 @@ def blocks(  # noqa: PLR0913 - a public verb
 def _drifting(
     units: Mapping[str, Mapping[str, Any]] | None, drift: float, duration_s: float
 ) -> Mapping[str, Mapping[str, Any]]:
-    """The units' options with a zero that moves by ``drift`` of each sensor's range over the trial."""
+    """The units' options with a zero that drifts by ``drift`` of each sensor's range over the trial."""
     given = {unit: {key: dict(table) for key, table in options.items()} for unit, options in (units or {}).items()}
     if drift:
         from simulators.instruments import presets

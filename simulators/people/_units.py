@@ -1,4 +1,4 @@
-"""The sensing units of a person's shoes, by their presets."""
+"""The sensing units of a person's shoes, from their presets."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def sensing_units(
     sides: Sequence[str] = ("left", "right"),
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[SensingUnit, ...]:
-    """The units of the shoes by their presets; ``options`` maps a unit's name to what differs (bladder, sensor).
+    """The units of the shoes from their presets; ``options`` maps a unit's name to changes (bladder, sensor).
 
-    The key "*" goes to every unit. Raises `pydantic.ValidationError` on wrong options.
+    The key "*" applies to every unit. Raises `pydantic.ValidationError` for wrong options.
     """
     given = options or {}
     made = []

@@ -1,11 +1,11 @@
-"""True events of a foot, from its true loads: what a force plate and perfect cells under the coils would say.
+"""True events of a foot from its true loads, as a force plate and perfect cells under the coils would give them.
 
-A foot is on the ground while its whole vertical force exceeds 2 % of body weight (10 N for 53 kg; plates are read at
-10-20 N); heel and forefoot bear while the heel's coil, or one of the metatarsals', exceeds as much.
+A foot is on the ground while its total vertical force exceeds 2 % of body weight (10 N for 53 kg; plates are read at
+10-20 N). The heel is loaded while its coil exceeds as much, the forefoot while one of the metatarsals' does.
 
-- heel_strike: the foot comes to the ground (whichever region comes first);
-- foot_flat: heel and forefoot both bear, from now on;
-- heel_off: the heel no longer bears, the foot does;
+- heel_strike: the foot reaches the ground (whichever region is first);
+- foot_flat: heel and forefoot are both loaded from now on;
+- heel_off: the heel is no longer loaded, but the foot is;
 - toe_off: the foot leaves the ground.
 """
 
@@ -33,7 +33,7 @@ class TrueEvent:
 
 
 def crossings(time_s: Array, signal: Array, level: float) -> tuple[Array, Mask]:
-    """When (m,) the signal (n,) crosses the level, linear between samples, and whether upwards."""
+    """Times (m,) at which the signal (n,) crosses the level, linear between samples, and whether upwards (m,)."""
     above = signal > level
     at = np.flatnonzero(above[1:] != above[:-1])
     before, after = signal[at], signal[at + 1]
@@ -41,7 +41,7 @@ def crossings(time_s: Array, signal: Array, level: float) -> tuple[Array, Mask]:
 
 
 def events_of(foot: str, time_s: Array, loads_n: Array, body_weight_n: float) -> list[TrueEvent]:
-    """Events between the first and the last time, in order; ``loads_n`` (n, 5) is one foot's, as in `COLUMNS`."""
+    """Events between the first and the last time, in order; ``loads_n`` (n, 5) are one foot's, as in `COLUMNS`."""
     level = THRESHOLD * body_weight_n
     found: list[TrueEvent] = []
     if time_s.size < 2:

@@ -1,4 +1,4 @@
-"""Who moves, and how: a person and the activities of a trial, with what a speed implies where nothing else is said.
+"""A person and the activities of a trial; properties that are not given follow from the speed.
 
 Speeds are in m/s over the ground or the belt. Sources of the laws: `simulators.people._speed`.
 """
@@ -21,7 +21,7 @@ def _require(holds: bool, says: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person. Asymmetries are (right - left)/mean: of the vertical impulse a foot takes, and of its stance time."""
+    """A person. Asymmetries are (right - left)/mean, of a foot's vertical impulse and of its stance time."""
 
     body_weight_n: float = BODY_WEIGHT_N
     load_asymmetry: float = 0.0
@@ -40,10 +40,10 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Walking or running at a speed: what is None follows from the speed.
+    """Walking or running at a speed; properties that are None follow from the speed.
 
     ``stride_time_cv`` is the stride time's standard deviation over its mean, ``load_cv`` that of each region's load
-    from stance to stance. ``turning`` is 0 straight on, towards 1 a tight turn to the left, -1 to the right.
+    from stance to stance. ``turning`` is 0 straight on, towards 1 a tight turn to the left, towards -1 to the right.
     """
 
     speed_m_per_s: float
@@ -66,12 +66,12 @@ class Move:
 
     @property
     def speeds_m_per_s(self) -> tuple[float, float]:
-        """The speeds at which a person can do this."""
+        """The range of speeds in m/s at which a person can move like this."""
         raise NotImplementedError
 
     @property
     def stance_shares(self) -> tuple[float, float]:
-        """The shares of a stride that a stance can last: above a half is walking."""
+        """The range of the share of a stride that a stance lasts: above a half is walking."""
         raise NotImplementedError
 
     def cadence(self, person: Person) -> float:
@@ -102,12 +102,12 @@ class Walk(Move):
 
     @property
     def speeds_m_per_s(self) -> tuple[float, float]:
-        """From a shuffle to what only race walkers exceed."""
+        """From a shuffle to a speed that only race walkers exceed."""
         return 0.3, 2.6
 
     @property
     def stance_shares(self) -> tuple[float, float]:
-        """Above a half, so that both feet are on the ground twice a stride."""
+        """Above a half, so that both feet are on the ground twice per stride."""
         return 0.505, 0.85
 
     def cadence(self, person: Person) -> float:
@@ -149,7 +149,7 @@ class Run(Move):
 
 
 def move_at(speed_m_per_s: float) -> Walk | Run:
-    """What a person does at this speed of a belt: the transition lies at 2.05 m/s."""
+    """Walking or running, as a person does at this speed of a belt; the transition is at 2.05 m/s."""
     return Walk(speed_m_per_s) if speed_m_per_s < speed.TRANSITION_M_PER_S else Run(speed_m_per_s)
 
 
@@ -162,7 +162,7 @@ class Stand:
 
 @dataclass(frozen=True, slots=True)
 class Tiptoe:
-    """From flat feet on to the toes and back, in ``rise_s`` each way; up for what is left of its duration."""
+    """From flat feet onto the toes and back, in ``rise_s`` each way; on the toes for the rest of its duration."""
 
     rise_s: float = 0.8
     sway_cv: float = 0.06
@@ -172,4 +172,4 @@ class Tiptoe:
 
 
 Activity = Walk | Run | Stand | Tiptoe
-Part = tuple[Activity, float]  # and its duration in s
+Part = tuple[Activity, float]  # an activity and its duration in s

@@ -1,10 +1,10 @@
-"""A trial's plan: every contact and every stay of a sequence of activities, drawn once, then asked at any times.
+"""A trial's plan: every contact and every stay of a sequence of activities, drawn once, then evaluated at any times.
 
-The loads at a time depend on the plan alone, so that a day can be asked block by block and a fine grid agrees with a
-coarse one. A walk that begins from standing unloads the first foot while the other takes over; one that ends has the
-swinging foot come down beside the other.
+The loads at a time depend on the plan alone, so that a day can be evaluated block by block and a fine grid agrees with
+a coarse one. A walk that begins from standing unloads the first foot while the other takes over; at its end the
+swinging foot lands beside the other.
 
-*Left out:* that momentum balances in the half second of starting and stopping (within some 20 % of body weight).
+*Left out:* balance of momentum in the half second of starting and stopping (within some 20 % of body weight).
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from smartshoe.errors import UsageError
 FEET = ("left", "right")
 STEP_ON_S = 0.5
 STEP_ON_APART_S = 0.3
-UNLOAD_S = 0.35  # of the first foot, when a walk begins
+UNLOAD_S = 0.35  # duration of unloading the first foot when a walk begins
 FIRST_SWING_S = 0.42
-LATE_BEGIN_S, LATE_END_S = 0.10, 0.45  # what a stance from or to standing lasts longer
+LATE_BEGIN_S, LATE_END_S = 0.10, 0.45  # how much longer a stance from or to standing lasts
 
 
 @dataclass(frozen=True, eq=False)
 class GaitPlan:
-    """What both feet do over ``duration_s``: contacts by chain, (left, right) each, and stays on both feet."""
+    """What both feet do over ``duration_s``: chains of contacts, (left, right) each, and stays on both feet."""
 
     person: Person
     duration_s: float
@@ -54,7 +54,7 @@ class GaitPlan:
 
 
 def parts_of(activity: Activity | Sequence[Part], duration_s: float | None) -> tuple[tuple[Part, ...], float]:
-    """A sequence of (activity, seconds), and how long it is; raises `UsageError` where that cannot be known."""
+    """A sequence of (activity, seconds), and its total duration in s; raises `UsageError` where that is not defined."""
     if isinstance(activity, Move | Stand | Tiptoe):
         if duration_s is None:
             raise UsageError("duration_s is missing: say how long the trial lasts")
@@ -64,7 +64,7 @@ def parts_of(activity: Activity | Sequence[Part], duration_s: float | None) -> t
         raise UsageError("a sequence needs one activity at least, each with a duration above 0 s")
     whole = sum(seconds for _, seconds in parts)
     if duration_s is not None and duration_s > whole + 1e-9:
-        # The last one goes on.
+        # The last activity continues.
         parts = (*parts[:-1], (parts[-1][0], parts[-1][1] + duration_s - whole))
     return parts, whole if duration_s is None else duration_s
 
@@ -79,10 +79,10 @@ def plan(
     outside: Outside = "midfoot",
     first_contact_s: float = 0.5,
 ) -> GaitPlan:
-    """The plan of a trial that begins in the air and touches down at ``first_contact_s``.
+    """The plan of a trial that begins in the air and lands at ``first_contact_s``.
 
     ``activity`` is one activity, or a sequence of (activity, seconds). ``coverage`` is the share of each activity's
-    load that passes through the coils. Raises `UsageError` for a duration or a coverage that makes no sense.
+    load that passes through the coils. Raises `UsageError` for an impossible duration or coverage.
     """
     if not 0.0 < coverage <= 1.0:
         raise UsageError(f"coverage is {coverage:g}: give the share of the load under the coils, above 0, at most 1")
@@ -143,7 +143,7 @@ def _chain(
     outside: Outside,
     rng: np.random.Generator,
 ) -> tuple[tuple[Stances, Stances], Array]:
-    """The contacts of moves without a stop, and when each foot is down (2, 2) to stand afterwards."""
+    """The contacts of moves without a stop, and the times (2, 2) at which each foot is down to stand afterwards."""
     moves: list[tuple[Move, float, float]] = []
     now = begin_s
     for activity, seconds in parts:
@@ -155,7 +155,7 @@ def _chain(
     end_s = now - step_s[-1] - UNLOAD_S if to_standing else now + 3.0 * step_s[-1]
     moves[-1] = (moves[-1][0], moves[-1][1], end_s)
     if from_standing:
-        # The foot that stands on is a contact too: it would have struck a step before the first one does.
+        # The foot that still stands is a contact too: it would have struck one step before the first one.
         first_s = begin_s + UNLOAD_S + FIRST_SWING_S - step_s[0]
         moves[0] = (moves[0][0], first_s, moves[0][2])
     made = steps(person, moves, 1 if from_standing else 0, rng)
@@ -181,14 +181,14 @@ def _late(
     fade_s: tuple[float, float],
     fades: float,
 ) -> tuple[Stances, Stances]:
-    """The chain with contact ``at`` of ``foot`` begun earlier or ended later, and faded from or to standing."""
+    """The chain with contact ``at`` of ``foot`` started earlier or ended later, and faded from or to standing."""
     old = chain[foot]
     begin, duration, amplitude = old.begin_s.copy(), old.duration_s.copy(), old.amplitude_n.copy()
     window, kind = old.fade_s.copy(), old.fades.copy()
     stop_s = end_s if end_s is not None else begin[at] + duration[at]
     begin[at] = begin_s if begin_s is not None else begin[at]
     duration[at] = stop_s - begin[at]
-    # Longer for the same load, not weaker for the same impulse.
+    # A longer contact keeps its load rather than its impulse.
     amplitude[at] = np.median(amplitude)
     window[at], kind[at] = fade_s, fades
     new = replace(old, begin_s=begin, duration_s=duration, amplitude_n=amplitude, fade_s=window, fades=kind)

@@ -1,4 +1,4 @@
-"""What a shoe's options say of the feet in it, as a plan of `simulators.people`: walk, run, stand, tiptoe."""
+"""A shoe's gait options as a plan of `simulators.people`: walk, run, stand, tiptoe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PROFILES = ("walk", "stand", "run", "tiptoe")
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """A person's gait: what is None follows from the speed, and the speed from the activity.
+    """A person's gait; what is None follows from the speed, and the speed from the activity.
 
     ``coverage`` is the share of the load that passes through the units (`simulators.people.shape`).
     """
@@ -39,11 +39,14 @@ class Gait:
 
     @property
     def person(self) -> Person:
-        """The person."""
+        """The person with these options."""
         return Person(self.body_weight_n, self.load_asymmetry, self.time_asymmetry, WALK_RATIO_M_MIN)
 
     def activity(self, profile: str, duration_s: float) -> Activity | tuple[Part, ...]:
-        """What the person does: ``profile`` is one of `PROFILES`. On tiptoe for 10 s at most, flat before and after."""
+        """The activity of ``profile``, one of `PROFILES`.
+
+        Tiptoe lasts at most 10 s, with flat feet before and after.
+        """
         if profile == "stand":
             return Stand(self.sway_cv)
         if profile == "tiptoe":
@@ -65,7 +68,7 @@ class Gait:
         )
 
     def plan(self, profile: str, duration_s: float, rng: np.random.Generator) -> GaitPlan:
-        """The plan of ``duration_s``; raises `UsageError` for what nobody can do."""
+        """The plan for ``duration_s``; raises `UsageError` for impossible options."""
         return plan(
             self.person,
             self.activity(profile, duration_s),

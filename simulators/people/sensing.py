@@ -1,4 +1,4 @@
-"""The eight units under two feet: bladder, HDI sensor and 12-bit converter, sampled as the microcontroller does.
+"""The eight units under two feet: bladder, HDI sensor and 12-bit converter, sampled like the microcontroller does.
 
 *Left out:* cross talk between units, the clock's drift, samples lost on the way (the wire's emulator has those).
 """
@@ -23,11 +23,11 @@ class Sampler:
         self.adc = SimulatedMyRio(MyRioParameters(bits=bits), rng)
 
     def converted_mbar(self, unit: SensingUnit, voltage_v: Array) -> Array:
-        """A unit's reading (n,) in mbar, from its sensor's voltage (n,) by way of the converter."""
+        """A unit's reading (n,) in mbar from its sensor's voltage (n,), through the converter."""
         return np.asarray(MILLIBAR.from_si(unit.sensor.to_pressure_pa(self.adc.convert(voltage_v))))
 
     def reset(self) -> None:
-        """Back to rest: unloaded, in steady state."""
+        """Return to rest: unloaded, in steady state."""
         for unit in self.units:
             unit.bladder.reset()
             unit.sensor.reset()

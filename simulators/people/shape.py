@@ -1,9 +1,9 @@
-"""How a stance loads the foot: four coils and what passes beside them, against the share of stance.
+"""How a stance loads the foot: the four coils and the part beside them, as functions of the share of stance.
 
-Walking's landmarks, in body weights at 1.3 m/s and 80 % coverage: heel 0.72 at 12 % of stance, off at 50 %; meta4
-0.51 at 74 %, on from 26 %; meta1 0.21 at 75 %; toe 0.41 at 85 %; the whole foot 1.03 at 24 %, 0.69 at 43 %, 1.10 at
-72 %. Running is one hump. Each region's course is a pulse of two halves sin^(2p), p above a half, so that it starts and
-ends without a step in its slope. What passes outside the coils is the midfoot, which has a time of its own.
+Walking's landmarks, in body weights at 1.3 m/s and 80 % coverage: heel 0.72 at 12 % of stance, off at 50 %; meta4 0.51
+at 74 %, on from 26 %; meta1 0.21 at 75 %; toe 0.41 at 85 %; the whole foot 1.03 at 24 %, 0.69 at 43 %, 1.10 at 72 %.
+Running is one hump. Each region's load is a pulse of two halves sin^(2p), p above a half, so that it starts and ends
+without a step in its slope. The part outside the coils is the midfoot, which has its own timing.
 
 *Left out:* the impact transient of a hard heel strike (its 10-20 ms are lost in a bladder), forefoot strikers, shear.
 """
@@ -23,8 +23,8 @@ from smartshoe.recording import REGIONS
 Outside = Literal["midfoot", "even"]
 
 COLUMNS = (*REGIONS, "outside")
-PHASES = 1000  # steps of a table over stance
-COVERAGE = 0.8  # of the impulse, by the tables below
+PHASES = 1000  # steps per stance in a table
+COVERAGE = 0.8  # share of the impulse on the coils, in the tables below
 # Begin, peak, end as shares of stance; p of the rise and of the fall; height in body weights.
 WALKING = {
     "heel": (0.00, 0.124, 0.500, 0.60, 0.70, 0.720),
@@ -43,16 +43,16 @@ RUNNING = {
 
 
 def pulse(stance: Array, begin: float, peak: float, end: float, rise: float, fall: float, height: float) -> Array:
-    """One region's load (n,) at the shares of stance (n,)."""
+    """One region's load (n,) in body weights at the shares of stance (n,): a pulse of the given times and exponents."""
     rises = stance < peak
     side = np.where(rises, (stance - begin) / (peak - begin), (end - stance) / (end - peak))
     return np.asarray(height * np.sin(0.5 * np.pi * np.clip(side, 0.0, 1.0)) ** (2.0 * np.where(rises, rise, fall)))
 
 
 def covered(loads: Array, coverage: float, outside: Outside) -> Array:
-    """``loads`` (n, 5), the last column beside the coils, so divided that ``coverage`` of the impulse meets a coil.
+    """``loads`` (n, 5), the last column beside the coils, redistributed so that coils get ``coverage`` of the impulse.
 
-    The foot's whole load stays as it is at each moment. "midfoot": what misses the coils keeps its own course;
+    The foot's total load is unchanged at each moment. "midfoot": the part beside the coils keeps its own time course;
     "even": it is the same share at each moment.
     """
     if not 0.0 < coverage <= 1.0:
@@ -67,7 +67,7 @@ def covered(loads: Array, coverage: float, outside: Outside) -> Array:
         share = 1.0 - (1.0 - coverage) / (1.0 - natural) * (1.0 - met)
     else:
         share = met * coverage / natural
-    # Where only the midfoot bears, there is no coil whose load could be scaled.
+    # Where only the midfoot is loaded, there is no coil load to scale.
     share = np.where(units > 1e-9 * whole.max(), share, 0.0)
     scale = np.where(units > 0, share * whole / np.where(units > 0, units, 1.0), 0.0)
     return np.column_stack([loads[:, :-1] * scale[:, None], whole * (1.0 - share)])
@@ -77,9 +77,9 @@ def covered(loads: Array, coverage: float, outside: Outside) -> Array:
 def table(
     kind: Literal["walk", "run"], speed_m_per_s: float, coverage: float, outside: Outside, leaning: float = 0.0
 ) -> Array:
-    """Loads (`PHASES` + 1, 5) over stance in body weights, columns as in `COLUMNS`; never written to.
+    """Loads (`PHASES` + 1, 5) over stance in body weights, columns as in `COLUMNS`; a read-only array.
 
-    ``leaning`` moves load from the outer (meta4) to the inner metatarsal (meta1) as a share, as an inner turn does.
+    ``leaning`` is the share of load moved from the outer (meta4) to the inner metatarsal (meta1), as in a turn.
     """
     stance = np.linspace(0.0, 1.0, PHASES + 1)
     pulses = WALKING if kind == "walk" else RUNNING

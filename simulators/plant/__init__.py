@@ -1,1 +1,1 @@
-"""The bladder: wall, gas and contact, integrated at a fine step."""
+"""The simulated bladder: wall, gas and contact, integrated at a fine step."""

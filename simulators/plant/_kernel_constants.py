@@ -1,7 +1,7 @@
-"""What the compiled time stepping takes from a bladder: its constants by name, each as its kernel multiplies it.
+"""A bladder's constants for the compiled time stepping, by name, in the form in which its kernel multiplies them.
 
-Stresses are in units of the ambient pressure, deformations in shares of the gas volume, times in s. A NamedTuple of
-numbers: numba takes it as it is.
+Stresses are in units of the ambient pressure, deformations in shares of the gas volume, times in s. They are a
+NamedTuple of numbers, which numba accepts directly.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from simulators.plant.bladder_parameters import AMBIENT_K, AMBIENT_PA, HEAT_RATI
 
 
 class PlainConstants(NamedTuple):
-    """Of `simulators.plant._stepping`: the paper's unit and the first effects. Switches are 1 or 0."""
+    """Constants of `simulators.plant._stepping`: the paper's unit and the first effects. Switches are 1 or 0."""
 
     stiffness: float
     arm_stiffness: float
@@ -38,7 +38,7 @@ class PlainConstants(NamedTuple):
 
 
 class WallConstants(NamedTuple):
-    """Of `simulators.plant._wall_stepping`: every effect of wall and air. Switches are 1 or 0."""
+    """Constants of `simulators.plant._wall_stepping`: every effect of wall and air. Switches are 1 or 0."""
 
     stiffness: float
     full_stress: float
@@ -68,12 +68,12 @@ class WallConstants(NamedTuple):
 
 
 def per_newton(p: BladderParameters) -> float:
-    """Stress in units of ambient for a load of 1 N."""
+    """Stress in units of ambient pressure for a load of 1 N."""
     return 1.0 / (p.effective_area_m2 * AMBIENT_PA)
 
 
 def plain_constants(p: BladderParameters, loop_n: float) -> PlainConstants:
-    """The plain kernel's; ``loop_n`` is what the friction loop's relays together bear."""
+    """The plain kernel's constants; ``loop_n`` is the load that the friction loop's relays bear together."""
     constants = PlainConstants(
         stiffness=p.k1 * p.x_over_nrt,
         arm_stiffness=p.k2 * p.x_over_nrt,
@@ -97,11 +97,11 @@ def plain_constants(p: BladderParameters, loop_n: float) -> PlainConstants:
         conditioning=p.conditioning.gain,
         per_cycle=1.0 / p.conditioning.cycles,
     )
-    return PlainConstants._make(map(float, constants))  # a whole number would be another type, compiled anew
+    return PlainConstants._make(map(float, constants))  # an int would be another type and be compiled again
 
 
 def wall_constants(p: BladderParameters) -> WallConstants:
-    """The other kernel's."""
+    """The constants of the kernel with all effects of wall and air."""
     full_stress, full_e, second = p.full_scale_n * per_newton(p), p.full_scale_deformation, p.second_relaxation
     constants = WallConstants(
         stiffness=p.k1 * p.x_over_nrt,

@@ -1,4 +1,4 @@
-"""Between a bladder's parameters and the compiled time stepping: its memory, and what acts on the load first."""
+"""Connects a bladder's parameters to the compiled time stepping: keeps the memory, and applies load-side effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from smartshoe.arrays import Array
 
 
 class PlainStepper:
-    """The kernel of `simulators.plant._stepping`: the paper's unit and the first effects."""
+    """Steps the kernel of `simulators.plant._stepping`: the paper's unit and the first effects."""
 
     def __init__(self, parameters: BladderParameters) -> None:
         self.parameters = p = parameters
@@ -24,14 +24,14 @@ class PlainStepper:
 
     @staticmethod
     def suffices(p: BladderParameters) -> bool:
-        """Whether the plain kernel knows all that is on."""
+        """Whether the plain kernel implements all effects that are on."""
         many = p.gas_heat.modes > 1 and p.gas_heat.fraction > 0.0
         on = [p.wall_stiffening, p.second_relaxation.k3, p.power_law_creep.stiffness, p.stick_slip.strength]
         on += [p.bouc_wen.strength, p.permanent_set.rate_per_s, p.leak.capillary_per_s, p.leak.nozzle_per_s]
         return not many and not any(on)
 
     def reset(self, session: int) -> None:
-        """Back to rest."""
+        """Return to rest."""
         from simulators.plant._stepping import STATE_SIZE
 
         self._state = np.zeros(STATE_SIZE)
@@ -39,7 +39,7 @@ class PlainStepper:
         self._partial = np.zeros(MEMORY)
 
     def advance(self, load_n: Array, finer: int, step_s: float) -> tuple[Array, Array]:
-        """Pressure in units of ambient and deformation, both (n,)."""
+        """Pressure in units of ambient pressure, and deformation, both (n,)."""
         from simulators.plant._stepping import advance
 
         pressure, deformation = np.empty(load_n.size), np.empty(load_n.size)
@@ -51,7 +51,7 @@ class PlainStepper:
 
 
 class WallStepper:
-    """The kernel of `simulators.plant._wall_stepping`: every effect of wall and air."""
+    """Steps the kernel of `simulators.plant._wall_stepping`: every effect of wall and air."""
 
     def __init__(self, parameters: BladderParameters) -> None:
         self.parameters = p = parameters
@@ -63,7 +63,7 @@ class WallStepper:
         self._sliders = p.stick_slip.elements(constants.full_stress, constants.full_e)
 
     def reset(self, session: int) -> None:
-        """Back to rest."""
+        """Return to rest."""
         from simulators.plant._wall_stepping import SCALARS
 
         self._front.reset()
@@ -72,7 +72,7 @@ class WallStepper:
         self._load_n = 0.0
 
     def advance(self, load_n: Array, finer: int, step_s: float) -> tuple[Array, Array]:
-        """Pressure in units of ambient and deformation, both (n,)."""
+        """Pressure in units of ambient pressure, and deformation, both (n,)."""
         from simulators.plant._wall_stepping import advance_wall
 
         fine_n = upsampled(load_n, self._load_n, finer)
@@ -87,7 +87,7 @@ class WallStepper:
 
 
 class PlainFront:
-    """What the plain kernel does to the load inside, for the other one: hysteresis, power law, conditioning."""
+    """The load-side effects of the plain kernel, for the other one: hysteresis, power law, conditioning."""
 
     def __init__(self, parameters: BladderParameters) -> None:
         self.parameters = p = parameters
@@ -97,12 +97,12 @@ class PlainFront:
         self.reset()
 
     def reset(self) -> None:
-        """Back to rest."""
+        """Return to rest."""
         self._turning, self._partial = np.zeros(MEMORY), np.zeros(MEMORY)
         self._state = np.array([1.0, 0.0, 0.0])
 
     def acting(self, load_n: Array) -> Array:
-        """The load (n,) in N that the wall feels."""
+        """The load (n,) in N that acts on the wall."""
         p = self.parameters
         acting = load_n
         if self._loop_n != 0.0 or p.conditioning.gain != 0.0:
@@ -122,7 +122,7 @@ class PlainFront:
 
 
 class ContactStepper:
-    """What stands between plate and tube, before either kernel."""
+    """Applies the contact between plate and tube before either kernel."""
 
     def __init__(self, parameters: BladderParameters) -> None:
         self.parameters = parameters
@@ -130,17 +130,17 @@ class ContactStepper:
 
     @staticmethod
     def is_needed(p: BladderParameters) -> bool:
-        """Whether something stands there."""
+        """Whether any effect of the contact is on."""
         contact = (p.contact.saturation, p.contact.gap_n, p.contact.direction_gain, p.contact.rate_gain)
         return any(contact) or any((p.odd.resonance, p.odd.pinch, p.odd.seating, p.odd.snap))
 
     def reset(self, session: int) -> None:
-        """Back to rest; the oddities strike each session anew."""
+        """Return to rest; effects outside the catalogue are drawn again for each session."""
         self._tube.reset(session)
         self._contact, self._odd, self._load_n = ContactState(), fresh(session), 0.0
 
     def advance(self, load_n: Array, finer: int, step_s: float) -> tuple[Array, Array]:
-        """Pressure in units of ambient and deformation, both (n,)."""
+        """Pressure in units of ambient pressure, and deformation, both (n,)."""
         p = self.parameters
         fine_n = upsampled(load_n, self._load_n, finer)
         self._load_n = float(load_n[-1]) if load_n.size else self._load_n
@@ -158,12 +158,12 @@ def _tube(parameters: BladderParameters) -> PlainStepper | WallStepper:
 
 
 def stepper(parameters: BladderParameters) -> Stepper:
-    """What carries the unit through time: the plain kernel alone wherever it knows all of the effects that are on."""
+    """The time stepping of a unit: the plain kernel alone wherever it implements all effects that are on."""
     return ContactStepper(parameters) if ContactStepper.is_needed(parameters) else _tube(parameters)
 
 
 def upsampled(load_n: Array, before_n: float, finer: int) -> Array:
-    """The load at ``finer`` steps a sample, linear from ``before_n``, each sample the last of its steps."""
+    """The load with ``finer`` steps per sample, linear from ``before_n`` on; each sample is the last of its steps."""
     if finer == 1:
         return load_n
     place = np.arange(1, load_n.size * finer + 1) / finer

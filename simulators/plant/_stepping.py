@@ -1,6 +1,6 @@
-"""The bladder's time stepping, compiled: one small kernel, so that it compiles within two seconds.
+"""The bladder's compiled time stepping: one small kernel, which compiles within two seconds.
 
-The equations stand in `simulators.plant.bladder`; every stress here is in units of the ambient pressure.
+`simulators.plant.bladder` has the equations; every stress here is in units of the ambient pressure.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from simulators.plant.preisach import mean_curve, relays_up
 from smartshoe.arrays import Array
 
 STATE_SIZE = 11
-ORIFICE_SMOOTHING = 1e-4  # of ambient: the square root's infinite slope at zero pressure is laminar in truth
-CYCLE_BEGINS, CYCLE_ENDS = 0.10, 0.01  # of full scale: a load cycle counts once it has come and gone
+ORIFICE_SMOOTHING = 1e-4  # of ambient: near zero pressure the flow is laminar, so the root's slope is finite
+CYCLE_BEGINS, CYCLE_ENDS = 0.10, 0.01  # of full scale: a load cycle counts once it has ended
 
 
 @njit(cache=True)
 def newton(at: float, off: float, slope: float, low: float, high: float) -> tuple[float, float, float, float]:
-    """One step on a rising balance that is ``off`` at ``at``: the next place, the way there, and the bracket's ends.
+    """One step towards the root of an increasing balance that is ``off`` at ``at``.
 
-    Where Newton leaves the bracket, its middle is taken.
+    Returns the next point, the step, and the bracket's ends. Where Newton leaves the bracket, its middle is taken.
     """
     if off > 0.0:
         high = at
@@ -38,7 +38,7 @@ def newton(at: float, off: float, slope: float, low: float, high: float) -> tupl
 
 @njit(cache=True)
 def cycle_at(load_n: float, full_n: float, in_cycle: bool) -> tuple[bool, bool]:
-    """Whether a load cycle goes on at ``load_n``, having gone on before or not, and whether one ends here."""
+    """Whether a load cycle is in progress at ``load_n``, given whether one was before, and whether one ends here."""
     if load_n > CYCLE_BEGINS * full_n:
         return True, False
     ended = in_cycle and load_n < CYCLE_ENDS * full_n
@@ -50,9 +50,9 @@ def advance(
     load_n: Array, finer: int, step_s: float, constants: PlainConstants, shape: Array,
     state: Array, turning: Array, partial: Array, pressure: Array, deformation: Array,
 ) -> None:  # fmt: skip
-    """Carry the state through ``load_n`` (n,), ``finer`` steps of ``step_s`` a sample; fill pressure and deformation.
+    """Advance the state through ``load_n`` (n,), with ``finer`` steps of ``step_s`` per sample.
 
-    ``state``, ``turning`` and ``partial`` are changed in place.
+    Fills ``pressure`` and ``deformation`` (n,); changes ``state``, ``turning`` and ``partial`` in place.
     """
     c = constants
     K1, K2, full_n, full_e = c.stiffness, c.arm_stiffness, c.full_n, c.full_e
@@ -91,7 +91,7 @@ def advance(
 
             q_fixed = keep * q + (mean - keep) * e
             theta_fixed = heat_keep * theta
-            # Newton on the balance; it rises with e, so a bracket from the iterates themselves is safe.
+            # Newton on the balance, which increases with e, so that the iterates themselves give a safe bracket.
             low, high = -1e9, 0.999 if boyle else 1e9
             new = min(2.0 * e - e_before, 0.99) if boyle else 2.0 * e - e_before
             for _ in range(60):
@@ -117,7 +117,7 @@ def advance(
                 new, move, low, high = newton(new, off, slope + (tangent + K2 * mean), low, high)
                 if abs(move) <= 1e-13:
                     break
-            # The last correction is below rounding: bring the rest of the state to the same deformation.
+            # The last correction is below rounding: update the rest of the state to the same deformation.
             q = q_fixed + (1.0 - mean) * new
             if boyle:
                 theta = theta_fixed + heat * heat_mean * math.log((1.0 - e) / (1.0 - new))

@@ -1,7 +1,7 @@
-"""The bladder's time stepping with every effect of wall and air, compiled apart from the plain one.
+"""The bladder's time stepping with every effect of wall and air, compiled separately from the plain one.
 
-The equations stand in `simulators.plant.bladder` and `simulators.effects`; every stress is in units of the ambient
-pressure. Load-side effects have acted already: the argument is the stress at every fine step.
+`simulators.plant.bladder` and `simulators.effects` have the equations; every stress is in units of the ambient
+pressure. Load-side effects have been applied before: the argument is the stress at every fine step.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from simulators.plant._stepping import ORIFICE_SMOOTHING, newton
 from smartshoe.arrays import Array
 
 SCALARS = 12
-LAMINAR = 3e-4  # of ambient: below this difference a nozzle's flow is viscous
+LAMINAR = 3e-4  # of ambient: below this pressure difference a nozzle's flow is viscous
 GAMMA = 1.4
 
 
@@ -25,7 +25,7 @@ def nozzle_flow(p: float) -> float:
     """Subsonic isentropic flow through a hole for gauge pressure ``p``, as sqrt(p) where p is small (Saint-Venant)."""
     size = abs(p)
     upstream = 1.0 + max(p, 0.0)
-    ratio = max((1.0 + min(p, 0.0)) / upstream, 0.53)  # choked beyond
+    ratio = max((1.0 + min(p, 0.0)) / upstream, 0.53)  # choked below
     flow = upstream * math.sqrt(
         max(GAMMA / (GAMMA - 1.0) * (ratio ** (2.0 / GAMMA) - ratio ** ((GAMMA + 1.0) / GAMMA)), 0.0)
     )
@@ -35,7 +35,7 @@ def nozzle_flow(p: float) -> float:
 
 @njit(cache=True)
 def faded(heats: Array, keep: Array) -> float:
-    """The sum of ``heats`` after a step in which each keeps its share ``keep``; changed in place."""
+    """The sum of ``heats`` after a step in which each keeps its share ``keep``; changes ``heats`` in place."""
     total = 0.0
     for j in range(heats.size):
         heats[j] *= keep[j]
@@ -47,7 +47,7 @@ def faded(heats: Array, keep: Array) -> float:
 def softened(
     wall: float, tangent: float, softening: float, e: float, e_max: float, width: float
 ) -> tuple[float, float]:
-    """Force and tangent of a wall that was deformed to ``e_max`` before; ``width`` in squares of deformation."""
+    """Force and tangent of a wall that was deformed to ``e_max`` before; ``width`` is a squared deformation."""
     bend = math.tanh((e_max * e_max - e * e) / width)
     left = 1.0 - softening * bend
     bend_slope = (1.0 - bend * bend) * 2.0 * e / width
@@ -56,7 +56,7 @@ def softened(
 
 @njit(cache=True)
 def slider_at(pull: float, spring: float, most: float) -> tuple[float, float]:
-    """What a slider holds (Jenkins) under an elastic ``pull``, and its stiffness: none once it slips."""
+    """The force of a slider (Jenkins) under an elastic ``pull``, and its stiffness, which is 0 once it slips."""
     if abs(pull) < most:
         return pull, spring
     return math.copysign(most, pull), 0.0
@@ -64,7 +64,7 @@ def slider_at(pull: float, spring: float, most: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def slide(z: float, way: float, power: float, gamma: float) -> float:
-    """Bouc and Wen's dz/dx for a motion in the sense of ``way``."""
+    """Bouc and Wen's dz/dx for a motion in the direction of ``way``."""
     sense = 1.0 if z * way > 0.0 else -1.0
     return float(1.0 - abs(z) ** power * (gamma + (1.0 - gamma) * sense))
 
@@ -75,7 +75,7 @@ def advance_wall(
     heat_rate: Array, slider_spring: Array, slider_most: Array,
     state: Array, arms: Array, heats: Array, sliders: Array, pressure: Array, deformation: Array,
 ) -> None:  # fmt: skip
-    """Carry the state through ``stress`` (n,), one step of ``step_s`` each; fill pressure and deformation (n,).
+    """Advance the state through ``stress`` (n,), one step of ``step_s`` each; fill pressure and deformation (n,).
 
     ``state`` (SCALARS,), ``arms``, ``heats`` and ``sliders`` are changed in place.
     """
@@ -142,7 +142,7 @@ def advance_wall(
             new, move, low, high = newton(new, off, slope + tangent, low, high)
             if abs(move) <= 1e-13:
                 break
-        # The last correction is below rounding: bring the rest of the state to the same deformation.
+        # The last correction is below rounding: update the rest of the state to the same deformation.
         grow = math.log((1.0 - e) / (1.0 - new)) if boyle else new - e
         theta = 0.0
         for j in range(heats.size):

@@ -1,4 +1,4 @@
-"""What a simulated bladder is made of; its equations stand in `simulators.plant.bladder`."""
+"""The parameters of a simulated bladder; `simulators.plant.bladder` has its equations."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ BESSEL_ZEROS = np.array([2.404826, 5.520078, 8.653728, 11.791534, 14.930918, 18.
 class HysteresisParameters:
     """Rate-independent friction of wall and contact (`simulators.plant.preisach`).
 
-    ``strength`` is half of the major loop's greatest height, as a fraction of full-scale load; the relays' half width
-    is ``half_width_n`` (1 +- ``spread``).
+    ``strength`` is half of the major loop's greatest height, as a fraction of full-scale load; ``half_width_n`` (1 +-
+    ``spread``) is the relays' half width.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -41,10 +41,10 @@ class HysteresisParameters:
 
 @dataclass(frozen=True, slots=True)
 class LeakParameters:
-    """Air that leaves the tube: ``linear_per_s`` at p/p0 each, ``orifice_per_s`` at sqrt(p/p0) (turbulent).
+    """Air that leaves the tube: ``linear_per_s`` times p/p0, ``orifice_per_s`` times sqrt(p/p0) (turbulent).
 
     Or by compressible flow: ``capillary_per_s`` through a narrow channel (Poiseuille, ((1 + p)^2 - 1)/2 for p/p0),
-    ``nozzle_per_s`` through a hole (Saint-Venant and Wantzel, laminar near zero), about sqrt(p/p0) too.
+    ``nozzle_per_s`` through a hole (Saint-Venant and Wantzel, laminar near zero), also about sqrt(p/p0).
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -76,7 +76,7 @@ class GasHeatParameters:
 
 @dataclass(frozen=True, slots=True)
 class TemperatureParameters:
-    """Temperature of the sealed air above that of the reset: a drift, and a warming that settles."""
+    """Temperature of the sealed air above that at the reset: a drift, and a warming that settles."""
 
     __pydantic_config__ = STRICT_KEYS
     drift_k_per_s: Finite = 0.0
@@ -86,10 +86,10 @@ class TemperatureParameters:
 
 @dataclass(frozen=True, slots=True)
 class SofteningParameters:
-    """Mullins softening (after Ogden and Roxburgh 1999): below the largest deformation so far the wall is softer.
+    """Mullins softening (after Ogden and Roxburgh 1999): below its largest deformation so far the wall is softer.
 
-    The loading that sets a new maximum follows the virgin curve. k1 is multiplied by 1 - ``strength``
-    tanh((e_max^2 - e^2)/(``width`` e_fullscale^2)).
+    Loading that sets a new maximum follows the virgin curve. k1 is multiplied by 1 - ``strength`` tanh((e_max^2 -
+    e^2)/(``width`` e_fullscale^2)).
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -111,9 +111,9 @@ class BladderParameters:
     """A bladder's physics; every effect is off by default.
 
     ``k1``, ``k2`` in N/m and ``c`` in N s/m as in Table 1 of Chinimilli 2016; ``x_over_nrt`` is x0^2/(nRT) in m/N.
-    ``static_exponent`` m passes the load as full_scale (F/full_scale)^m (contact that grows with load);
-    ``wall_hardening`` beta stiffens k1 by 1 + beta (e/e_fullscale)^2, ``wall_stiffening`` kappa makes its force
-    sinh(kappa x)/kappa, x = e/e_fullscale (Fung 1967). The nested effects stand in `simulators.effects`.
+    ``static_exponent`` m transforms the load to full_scale (F/full_scale)^m (contact that grows with load);
+    ``wall_hardening`` beta stiffens k1 by 1 + beta (e/e_fullscale)^2; ``wall_stiffening`` kappa makes its force
+    sinh(kappa x)/kappa, x = e/e_fullscale (Fung 1967). The nested effects are in `simulators.effects`.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -148,7 +148,7 @@ class BladderParameters:
 
     @property
     def full_scale_deformation(self) -> float:
-        """Deformation e at full-scale load, all effects off."""
+        """Deformation e at full-scale load, with all effects off."""
         return self.full_scale_n * self.static_gain_pa_per_n / AMBIENT_PA
 
     def nominal_pressure_pa(self, load_n: float) -> float:

@@ -1,4 +1,4 @@
-"""Hysteresis and the count of cycles on a load at the fine step, for the kernel that takes the stress ready made."""
+"""Hysteresis and cycle count of a load at the fine step, for the kernel that takes the stress as its input."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from smartshoe.arrays import Array
 def loop_and_cycles(
     load_n: Array, shape: Array, full_n: float, turning: Array, partial: Array, state: Array, loop: Array, cycles: Array
 ) -> None:
-    """Fill the loop (n,) about its mean curve, a share, and the cycles (n,) completed so far.
+    """Fill ``loop`` (n,), a share about its mean curve, and ``cycles`` (n,), the number completed so far.
 
-    ``state`` (3,) is the number of turning points, whether in a cycle, and the cycles; changed in place.
+    ``state`` (3,) is the number of turning points, whether a cycle is in progress, and the number of cycles; it is
+    changed in place.
     """
     count, in_cycle, done = int(state[0]), state[1] > 0.0, state[2]
     for i in range(load_n.size):

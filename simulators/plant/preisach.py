@@ -2,11 +2,11 @@
 
 A relay switches up where the load passes ``centre + r`` and down where it falls below ``centre - r``. The density of
 relays is uniform in r over [r_low, r_high] and parabolic in the centre over [low, high] with low = r_high, so that
-every relay is down at zero load. Because the density depends on the centre, the operator is no superposition of
-plays or stops (those are the case of a density uniform in the centre), and it has no differential equation as
-Bouc-Wen has: smartshoe cannot fit it with the equation that made the data.
+every relay is down at zero load. Because the density depends on the centre, the operator is not a superposition of
+plays or stops (which have a density uniform in the centre), and it has no differential equation as Bouc-Wen has:
+smartshoe cannot fit it with the equation that made the data.
 
-Memory is the stack of dominant turning points (wiping-out). Source: Mayergoyz 2003, Mathematical Models of
+Its memory is the stack of dominant turning points (wiping-out). Source: Mayergoyz 2003, Mathematical Models of
 Hysteresis, ch. 1: f(t) = sum over k of E(M_k, m_(k-1)) - E(M_k, m_k).
 """
 
@@ -19,7 +19,7 @@ from numba import njit
 
 from smartshoe.arrays import Array
 
-MEMORY = 256  # turning points stored; beyond it the two innermost are forgotten (a loop smaller than all others)
+MEMORY = 256  # turning points stored; beyond that the two innermost, the smallest loop, are dropped
 
 
 @njit(cache=True)
@@ -52,7 +52,7 @@ def everett(upper: float, lower: float, shape: Array) -> float:
 
 @njit(cache=True)
 def mean_curve(load: float, shape: Array) -> float:
-    """Mean of the major loop's two branches at ``load``: what is taken off so that only the loop is left."""
+    """Mean of the major loop's two branches at ``load``, which is subtracted so that only the loop remains."""
     r_low, r_high, low, high = shape[0], shape[1], shape[2], shape[3]
     up = _cumulated(load - r_low, low, high) - _cumulated(load - r_high, low, high)
     down = _cumulated(load + r_high, low, high) - _cumulated(load + r_low, low, high)
@@ -61,9 +61,9 @@ def mean_curve(load: float, shape: Array) -> float:
 
 @njit(cache=True)
 def relays_up(load: float, turning: Array, partial: Array, count: int, shape: Array) -> tuple[float, int]:
-    """Share of relays that are up once the load has gone to ``load``, and the new number of turning points.
+    """Share of relays that are up once the load has moved to ``load``, and the new number of turning points.
 
-    ``turning`` (MEMORY,) alternates minima (even places) and maxima (odd), the last one being the present load;
+    ``turning`` (MEMORY,) alternates minima (even positions) and maxima (odd), the last one being the present load;
     ``partial`` (MEMORY,) holds the share at each of them. Both are changed in place. ``turning[0]`` is zero load.
     """
     last = turning[count - 1]
@@ -71,7 +71,7 @@ def relays_up(load: float, turning: Array, partial: Array, count: int, shape: Ar
         return partial[count - 1], count
     rising = load > last
     is_maximum = (count - 1) % 2 == 1
-    if count == 1 or rising != is_maximum:  # a reversal: the last point stays, a new one begins
+    if count == 1 or rising != is_maximum:  # a reversal: the last point is kept and a new one added
         if count >= MEMORY - 1:
             count -= 2
         count += 1
@@ -100,8 +100,8 @@ def loop_shape(half_width_n: float, spread: float, full_scale_n: float) -> tuple
     """
     r_low, r_high = half_width_n * (1.0 - spread), half_width_n * (1.0 + spread)
     shape = np.array([r_low, r_high, r_high, r_high + 1.25 * full_scale_n])
-    # The loop is widest where the centres are densest. There half the difference of the two branches, averaged over
-    # the relays, is largest.
+    # The loop is widest where the centres are densest: half the difference of the branches, averaged over the
+    # relays, is largest there.
     middle = 0.5 * (shape[2] + shape[3])
     branches = [mean_curve(middle, shape), everett(middle, -10.0 * math.fabs(shape[3]), shape)]
     return shape, float(branches[0] - branches[1])

@@ -1,1 +1,1 @@
-"""A shoe's firmware behind a pseudo-terminal, with the faults of a line."""
+"""A shoe's firmware behind a pseudo-terminal, with the faults of a transmission line."""

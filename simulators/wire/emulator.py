@@ -1,4 +1,4 @@
-"""Any shoe, simulated or replayed, at a pseudo-terminal, speaking as its firmware would.
+"""Emulates a shoe's firmware on a pseudo-terminal, for any simulated or replayed shoe.
 
     python -m simulators.wire.emulator sim:walk --link ./shoe0
 
@@ -25,19 +25,19 @@ DEFAULT_LINK = "./shoe0"
 
 
 class ShoeTable(BaseModel):
-    """``[shoe]``: the address of a shoe; every further key is the backend's own."""
+    """The table ``[shoe]``: the address of a shoe; all further keys belong to the backend."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
     backend: str
 
     @property
     def options(self) -> dict[str, Any]:
-        """The keys beside ``backend``."""
+        """The keys other than ``backend``."""
         return dict(self.model_extra or {})
 
 
 class WireScenario(BaseModel):
-    """An emulator's scenario: which shoe, and what the wire does to it."""
+    """An emulator's scenario: which shoe, and which faults the wire has."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     title: str = "emulated shoe"
@@ -48,7 +48,7 @@ class WireScenario(BaseModel):
 
 
 def load(source: str) -> WireScenario:
-    """The scenario in a TOML file, or of a shoe's address without faults; raises `ScenarioError`."""
+    """The scenario in a TOML file, or for a shoe's address one without faults; raises `ScenarioError`."""
     if not source.endswith(".toml"):
         return WireScenario(shoe=ShoeTable(backend=source))
     try:

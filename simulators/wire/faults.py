@@ -1,9 +1,9 @@
-"""What a radio and a cable do to frames: loss in bursts, duplicates, flipped bits, halves, garbage, outages.
+"""Faults that a radio and a cable do to frames: bursts of loss, duplicates, flipped bits, halves, garbage, outages.
 
-Pure: bytes in, bytes out, every draw from the generator that is handed in, time only as it is told. The frames go in
-whole, each with its terminator, so that what arrived unharmed is known exactly.
+Without I/O: bytes in, bytes out, every draw from the given generator, time as an argument. Frames are passed in whole,
+each with its terminator, so that it is known exactly which arrived undamaged.
 
-*Left out:* frames that overtake each other (a serial stream keeps its order; only duplicates come late) and bits
+*Left out:* frames that overtake each other (a serial stream keeps its order; only duplicates arrive late) and bits
 flipped in correlated bursts across frames.
 """
 
@@ -24,11 +24,12 @@ LATEST_DUPLICATE = 3
 
 
 class WireFaults(BaseModel):
-    """``[wire]``: percentages are of frames; ``every_s`` is the length of a slot that holds one outage each.
+    """The table ``[wire]``: percentages are of frames.
 
-    ``clock_skew_ppm`` is the device's clock against true time, positive where it runs fast. ``batch_ms`` is how long
-    the radio gathers frames before it sends them. In a stall nothing arrives and nothing is lost; in a disconnection
-    the port goes, and with it what the device sends meanwhile; ``restarts`` says whether it then boots anew.
+    ``every_s`` is the length of a slot, which has one outage of each kind. ``clock_skew_ppm`` is that of the device's
+    clock against true time, positive where it runs fast. ``batch_ms`` is how long the radio collects frames before it
+    sends them. In a stall nothing arrives and nothing is lost; in a disconnection the port disappears, and what the
+    device sends meanwhile is lost; ``restarts`` tells whether it then reboots.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -51,14 +52,14 @@ class WireFaults(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class Aired:
-    """What arrived of some frames: the bytes, and which of the frames (n,) are in them whole and unchanged."""
+    """What arrived of some frames: the bytes, and a mask (n,) of the frames that arrived complete and unchanged."""
 
     data: bytes
     intact: Mask
 
 
 class FaultyAir:
-    """Passes frames on as ``faults`` say; remembers a burst of loss and late duplicates from call to call."""
+    """Passes frames on with the given ``faults``; bursts of loss and late duplicates continue from call to call."""
 
     def __init__(self, faults: WireFaults, rng: np.random.Generator) -> None:
         self.faults = faults
@@ -75,7 +76,7 @@ class FaultyAir:
         return int(self._rng.geometric(1.0 / max(mean, 1.0)))
 
     def _lost(self, count: int) -> Mask:
-        """Bursts of geometric length, ``loss_percent`` of all frames in the mean."""
+        """Mask of lost frames: bursts of geometric length, ``loss_percent`` of all frames on average."""
         lost = np.zeros(count, dtype=bool)
         at = 0
         while at < count:
@@ -93,7 +94,7 @@ class FaultyAir:
         return lost
 
     def pass_on(self, frames: Sequence[bytes]) -> Aired:
-        """What arrives of ``frames``, in order."""
+        """The bytes that arrive of ``frames``, in order, and which frames are intact."""
         count, faults, rng = len(frames), self.faults, self._rng
         if not count:
             return Aired(b"", np.zeros(0, dtype=bool))
@@ -137,7 +138,7 @@ def _half(frame: bytes, rng: np.random.Generator) -> bytes:
 
 
 def _with_flips(frame: bytes, rng: np.random.Generator) -> bytes:
-    """The frame with one bit flipped, or several (geometric, one to three mostly), each another one."""
+    """The frame with one flipped bit, or several different ones (geometric, mostly one to three)."""
     bits = 8 * len(frame)
     flips = min(int(rng.geometric(0.6)), bits)
     harmed = bytearray(frame)
@@ -147,7 +148,7 @@ def _with_flips(frame: bytes, rng: np.random.Generator) -> bytes:
 
 
 class Outages:
-    """One outage of ``lasting_s`` in each slot of ``every_s``, at a random place; none where either is zero."""
+    """One outage of ``lasting_s`` at a random time in each slot of ``every_s``; none where either is zero."""
 
     def __init__(self, every_s: float, lasting_s: float, rng: np.random.Generator) -> None:
         self._every_s, self._lasting_s = every_s, min(lasting_s, every_s)
@@ -161,7 +162,7 @@ class Outages:
         return self._starts[slot]
 
     def at(self, time_s: float) -> tuple[float, float] | None:
-        """Start and end of the outage that ``time_s`` lies in, or None."""
+        """Start and end of the outage that contains ``time_s``, or None."""
         if self._every_s <= 0.0 or self._lasting_s <= 0.0 or time_s < 0.0:
             return None
         start = self._start_of(int(time_s // self._every_s))

@@ -1,6 +1,6 @@
-"""A shoe's firmware on a virtual clock: plays any `Shoe` at its rate, speaks frames or text lines, hears commands.
+"""A shoe's firmware on a virtual clock: plays any `Shoe` at its rate, sends frames or text lines, obeys commands.
 
-*Left out:* the microcontroller's jitter of sampling, its boot time, a full scale that is not the sensor's range.
+*Left out:* jitter of the microcontroller's sampling, its boot time, a full scale other than the sensor's range.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ DEFAULT_RANGE = (0.0, 1000.0)
 
 
 class Firmware:
-    """``shoe`` is read through once, then played again and again, at ``rate_hz`` or its own rate.
+    """A simulated device that reads ``shoe`` once, then plays it repeatedly at ``rate_hz`` or its own rate.
 
-    ``clock_skew_ppm`` makes the device's clock run fast, ``boot_us`` is its counter at true time 0. Frames wait for
-    the start command, lines flow at once. True time is what the caller says; it only goes on. ``played`` (n, channels)
+    ``clock_skew_ppm`` makes the device's clock run fast, ``boot_us`` is its counter at true time 0. Frames wait for the
+    start command, lines are sent at once. True time is given by the caller; it only increases. ``played`` (n, channels)
     are the readings, in the shoe's unit.
     """
 
@@ -62,7 +62,7 @@ class Firmware:
 
     @property
     def information(self) -> Information:
-        """What the device says of itself."""
+        """The information that the device sends about itself."""
         channels = tuple(
             ChannelInformation(name, self.unit.symbol, float(low), float(high))
             for name, low, high in zip(self.names, self._low, self._high, strict=True)
@@ -77,7 +77,7 @@ class Firmware:
 
     @property
     def banner(self) -> bytes:
-        """What a sketch of text lines prints when its port is opened; nothing from frames."""
+        """What a sketch of text lines prints when its port is opened; empty for frames."""
         if self.format == "frames":
             return b""
         said = f"# firmware: emulator\n# serial: {self.serial_number}\n# rate: {self.information.rate_hz:g} Hz\n"
@@ -85,13 +85,13 @@ class Firmware:
         return said.encode("ascii") + encode_header(["t_us", *columns])
 
     def reboot(self, now_s: float) -> None:
-        """Counter and sequence start anew at true time ``now_s``; frames wait for a start command again."""
+        """Restart counter and sequence at true time ``now_s``; frames wait for a start command again."""
         self._booted_s, self._boot_us, self.sent = now_s, 0, 0
         self.is_streaming = self.format == "lines"
         self._commands = CommandDecoder()
 
     def hear(self, data: bytes) -> list[bytes]:
-        """Carry out the commands in ``data``; frames to answer with."""
+        """Carry out the commands in ``data``; returns the frames that answer them."""
         if self.format == "lines":
             return []
         answers: list[bytes] = []
@@ -108,7 +108,7 @@ class Firmware:
         return answers
 
     def next_due_s(self) -> float:
-        """True time of the next sample."""
+        """True time in s of the next sample."""
         return self._index / self.rate_hz
 
     def due(self, until_s: float) -> list[bytes]:
@@ -129,7 +129,7 @@ class Firmware:
         return whole_frames(encode_samples(sequence, device_us, self.counts(readings)))
 
     def counts(self, readings: Array) -> NDArray[np.uint16]:
-        """Readings (n, channels) as the converter's counts, held at its ends."""
+        """Readings (n, channels) as the converter's counts, limited to its range."""
         share = (readings - self._low) / (self._high - self._low)
         counts: NDArray[np.uint16] = np.clip(np.round(share * FULL_SCALE_COUNTS), 0, FULL_SCALE_COUNTS).astype(
             np.uint16
@@ -138,7 +138,7 @@ class Firmware:
 
 
 def whole_frames(data: bytes) -> list[bytes]:
-    """Zero-terminated frames, each with its terminator."""
+    """The zero-terminated frames in ``data``, each with its terminator."""
     return [part + b"\0" for part in data.split(b"\0")[:-1]]
 
 

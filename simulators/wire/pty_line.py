@@ -1,9 +1,9 @@
-"""A pseudo-terminal that stands for a shoe's serial port: its path comes back after the peer was gone.
+"""A pseudo-terminal that acts as a shoe's serial port; its path reappears after a disconnection.
 
-Linux and macOS; the modules for it are imported when one is opened. Traits of a pseudo-terminal that matter here:
-control lines (dtr, rts) do not exist (OSError); when this end goes, the reader's ``read`` raises `SerialException` but
-its ``in_waiting`` a plain OSError; what is not read piles up to some 20 kB, then writes would block: they never do
-here, what does not fit is refused, as a radio does.
+Linux and macOS; the modules for it are imported when one is opened. Properties of a pseudo-terminal that matter here:
+control lines (dtr, rts) do not exist (OSError). When this end closes, the reader's ``read`` raises `SerialException`,
+but its ``in_waiting`` a plain OSError. Unread bytes accumulate up to some 20 kB, then writes would block: here they
+never do, and what does not fit is refused, as a radio does.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from smartshoe.errors import DeviceError, UsageError
 
 
 class PtyLine:
-    """The device's end of a line whose other end is the port ``link``, a symbolic link to the pseudo-terminal."""
+    """The device's end of a serial line; the other end is the port ``link``, a symbolic link to the pseudo-terminal."""
 
     def __init__(self, link: Path | str) -> None:
         self.link = Path(link)
@@ -26,7 +26,7 @@ class PtyLine:
 
     @property
     def is_up(self) -> bool:
-        """Whether the port is there to be opened."""
+        """Whether the port exists and can be opened."""
         return self._master is not None
 
     def __enter__(self) -> Self:
@@ -37,7 +37,7 @@ class PtyLine:
         self.vanish()
 
     def appear(self) -> None:
-        """Make the port: a new pseudo-terminal under the same link; raises where the link cannot be made."""
+        """Create the port: a new pseudo-terminal under the same link; raises where the link cannot be created."""
         if self._master is not None:
             return
         try:
@@ -51,11 +51,11 @@ class PtyLine:
             raise UsageError(f"{self.link} is there already and is no link: give another place with --link")
         master, slave = pty.openpty()
         try:
-            # Echo would send our frames back to us as commands, until the reader has set its end raw.
+            # Echo would return our frames to us as commands, until the reader has set its end to raw mode.
             tty.setraw(slave)
             self._slave_path = os.ttyname(slave)
         finally:
-            # Without an end of our own the line hangs up when the reader goes: `peer_is_there` sees it.
+            # This process keeps no second end open, so the line hangs up when the reader closes: see `peer_is_there`.
             os.close(slave)
         os.set_blocking(master, False)
         self._master = master
@@ -70,7 +70,7 @@ class PtyLine:
             raise UsageError(f"link {self.link} cannot be made ({error.strerror}): give another place") from error
 
     def vanish(self) -> None:
-        """Take the port away: the link goes, whoever reads it gets an error; what was not read is lost."""
+        """Remove the port and its link: a reader gets an error, and unread bytes are lost."""
         if self._master is None:
             return
         if self.link.is_symlink() and str(self.link.readlink()) == self._slave_path:
@@ -80,7 +80,7 @@ class PtyLine:
 
     @property
     def peer_is_there(self) -> bool:
-        """Whether somebody has the port open."""
+        """Whether a reader has the port open."""
         import select
 
         if self._master is None:
@@ -90,7 +90,7 @@ class PtyLine:
         return not any(flags & select.POLLHUP for _, flags in poll.poll(0))
 
     def write(self, data: bytes) -> int:
-        """How many of ``data``'s first bytes fitted: all, some or none; never waits."""
+        """The number of leading bytes of ``data`` that were accepted: all, some or none; never waits."""
         if self._master is None or not data:
             return 0
         try:
@@ -99,7 +99,7 @@ class PtyLine:
             return 0
 
     def read(self, wait_s: float = 0.0) -> bytes:
-        """What the reader wrote (commands), within ``wait_s``; empty where it wrote nothing or is not there."""
+        """The bytes that the reader wrote (commands), within ``wait_s``; empty where it wrote none or is not there."""
         import select
 
         if self._master is not None:
@@ -108,13 +108,13 @@ class PtyLine:
                 return b""
             try:
                 return os.read(self._master, 4096)
-            except OSError:  # EIO: the reader has closed its end, and all that it wrote is read
+            except OSError:  # EIO: the reader has closed its end, and everything it wrote has been read
                 pass
         time.sleep(max(wait_s, 0.0))
         return b""
 
     def wait_writable(self, wait_s: float) -> bool:
-        """Whether there is room for bytes, within ``wait_s``."""
+        """Whether bytes can be written within ``wait_s``."""
         import select
 
         if self._master is None:

@@ -1,4 +1,4 @@
-"""`Emulator`: a firmware at a pseudo-terminal, in real time or as fast as it is read, with a radio's faults."""
+"""`Emulator`: a firmware on a pseudo-terminal, in real time or as fast as it is read, with a radio's faults."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from simulators.wire.pty_line import PtyLine
 
 Pace = Literal["real", "drain"]
 
-# A Bluetooth module's own buffer; what does not fit is dropped a whole send at a time.
+# Size of a Bluetooth module's buffer; a send that does not fit is dropped entirely.
 RADIO_BUFFER_BYTES = 8192
 TICK_S = 0.02
 # A sketch boots when its port is opened, and prints its header then.
@@ -27,7 +27,7 @@ DRAIN_BLOCK_S = 0.1
 
 @dataclass(slots=True)
 class Served:
-    """What the emulator has done so far; bytes that nobody heard are ``unheard_frames``' (port gone, not opened)."""
+    """Counts of what the emulator has done so far; ``unheard_frames`` were sent while the port was gone or not open."""
 
     frames: int = 0
     intact_frames: int = 0
@@ -38,10 +38,11 @@ class Served:
 
 
 class Emulator:
-    """Serves ``firmware`` at ``line``, through ``faults``.
+    """Serves ``firmware`` on ``line``, through ``faults``.
 
-    ``pace`` "real" follows ``clock`` and drops what the reader is too slow for, as a radio does; "drain" goes as
-    fast as the reader takes the bytes, drops nothing, and its time is the samples': it has no stalls and no batches.
+    ``pace`` "real" follows ``clock`` and drops what the reader is too slow for, as a radio does. "drain" goes as fast
+    as the reader takes the bytes and drops nothing; its time is that of the samples, and it has no stalls and no
+    batches.
     """
 
     def __init__(
@@ -73,7 +74,10 @@ class Emulator:
         return f"serial://{link}" if link.is_absolute() else f"serial://./{link}"
 
     def run(self, stop: threading.Event, duration_s: float = float("inf")) -> None:
-        """Serve until ``stop`` is set or ``duration_s`` of the device's time is over; the port goes at the end."""
+        """Serve until ``stop`` is set or ``duration_s`` of the device's time has passed.
+
+        The port is removed at the end.
+        """
         now_s = self.firmware.next_due_s()
         begin_s, end_s = self._clock() - now_s, now_s + duration_s
         try:
@@ -90,14 +94,14 @@ class Emulator:
 
     @contextmanager
     def serving(self) -> Iterator[str]:
-        """Serve from a thread of its own; yields the address, and raises what the thread raised."""
+        """Serve from a separate thread; yields the address, and re-raises what the thread raised."""
         stop = threading.Event()
         failed: list[BaseException] = []
 
         def run() -> None:
             try:
                 self.run(stop)
-            except BaseException as error:  # handed on below, to the thread that can act on it
+            except BaseException as error:  # re-raised below, in the caller's thread
                 failed.append(error)
 
         self.line.appear()
@@ -112,7 +116,7 @@ class Emulator:
             raise failed[0]
 
     def _is_drained(self) -> bool:
-        """Whether everything was taken by somebody who wants more, or the port is away and comes back with time."""
+        """Whether a reader has taken everything and wants more, or the port is absent and will reappear with time."""
         is_wanted = self.firmware.is_streaming and self.line.peer_is_there
         return not self._out and (is_wanted or not self.line.is_up)
 
@@ -139,13 +143,13 @@ class Emulator:
         aired = self._air.pass_on(frames)
         self.served.intact_frames += int(aired.intact.sum())
         self._queue(aired.data)
-        # A stall or a batch would wait for a time that, when draining, only goes on once they are out.
+        # A stall or a batch would wait for time to pass, which when draining only advances once the frames are out.
         if self.pace == "drain" or (self._stalls.at(now_s) is None and now_s >= self._next_batch_s):
             self._next_batch_s = now_s + 1e-3 * self.faults.batch_ms
             self._flush()
 
     def _is_heard(self, now_s: float) -> bool:
-        """Whether the port is open and the device behind it has booted; a sketch's header goes out first."""
+        """Whether the port is open and the device behind it has booted; sends a sketch's header first."""
         if not self.line.peer_is_there:
             self._opened_s = None
             return False

@@ -1,4 +1,4 @@
-"""From readings to force: a calibration, its filters, and banks of them."""
+"""From readings to force: calibrations, the filters they define, and banks of filters for several units."""
 
 from smartshoe.calibration._bank import CompensatorBank, stack
 from smartshoe.calibration._calibration import Calibration, compensate, compensated, extended_calibration

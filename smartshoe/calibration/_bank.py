@@ -1,4 +1,4 @@
-"""Several units at once: a bank of filters that run side by side, plain ones in one compiled pass."""
+"""A bank of filters for several units at once; plain filters run together in one compiled pass."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ _NO_FILTER = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.nan, 0.0]
 
 
 class CompensatorBank:
-    """Several units at once: one filter a unit, in the order given to `stack`.
+    """Filters of several units that run together, one filter per unit, in the order given to `stack`.
 
-    Its kernel is compiled (or fetched from numba's cache) here, so that the first tick of a live session does not wait.
+    The kernel is compiled (or fetched from numba's cache) on construction, so that the first tick of a live session is
+    not delayed.
     """
 
     def __init__(self, filters: Sequence[ForceFilter]) -> None:
@@ -42,23 +43,23 @@ class CompensatorBank:
         return len(self.filters)
 
     def reset(self) -> None:
-        """Forget the past of every unit."""
+        """Return all filters to their initial state."""
         self._bank[5:] = np.array([[0.0], [np.nan], [0.0]])
 
     @property
     def missing_count(self) -> tuple[int, ...]:
-        """Per unit, how many readings since `reset` were not finite."""
+        """For each unit, how many readings since `reset` were not finite."""
         return tuple(int(count) for count in self._bank[7])
 
     def push(self, readings: ArrayLike, out: Array | None = None) -> Array:
         """Forces in N of one tick (units,) or a block (ticks, units), of the same shape as ``readings``.
 
-        A new array, or ``out`` where it is given: float64, C-contiguous, of the readings' shape. It may be ``readings``
-        itself but not overlap it otherwise. A tick of float64 with ``out`` allocates no array.
-        Raises `InputError` for other shapes, and `UsageError` for an ``out`` that cannot be written to.
+        The result is a new array, or ``out`` where it is given: float64, C-contiguous, of the readings' shape. ``out``
+        may be ``readings`` itself, but must not overlap it otherwise. A tick of float64 with ``out`` allocates no
+        array. Raises `InputError` for other shapes, and `UsageError` for an ``out`` that cannot be written to.
         """
         if out is not None:
-            # Numba tells the types apart more cheaply than Python can, and refuses before it does anything.
+            # Numba checks the types more cheaply than Python can, and refuses wrong ones before it runs.
             try:
                 if out.ndim == 1 and self._push_tick(readings, out, self._bank):
                     return out
@@ -96,30 +97,30 @@ class CompensatorBank:
 
 
 class MixedBank(CompensatorBank):
-    """A bank in which some filters are not plain: these run one after the other, the plain ones as in any bank."""
+    """A bank in which some filters are not plain; those run one by one, the plain ones in one compiled pass."""
 
     def __init__(self, filters: Sequence[ForceFilter]) -> None:
         self._others: tuple[tuple[int, ForceFilter], ...] = ()
         super().__init__(filters)
-        # The bank's own copies, without a past.
+        # The bank's own copies, in their initial state.
         self._others = tuple((k, item) for k, item in enumerate(self.filters) if not isinstance(item, Compensator))
 
     def reset(self) -> None:
-        """Forget the past of every unit."""
+        """Return all filters to their initial state."""
         super().reset()
         for _, item in self._others:
             item.reset()
 
     @property
     def missing_count(self) -> tuple[int, ...]:
-        """Per unit, how many readings since `reset` were not finite."""
+        """For each unit, how many readings since `reset` were not finite."""
         counts = list(super().missing_count)
         for column, item in self._others:
             counts[column] = item.missing_count
         return tuple(counts)
 
     def push(self, readings: ArrayLike, out: Array | None = None) -> Array:
-        """As `CompensatorBank.push`."""
+        """The same as `CompensatorBank.push`."""
         # A copy, since ``out`` may be the readings themselves.
         block = np.array(numbers_of(readings, "readings"))
         forces_n = super().push(readings, out)
@@ -133,7 +134,7 @@ def _column(item: ForceFilter) -> list[float]:
 
 
 def stack(filters: Sequence[ForceFilter]) -> CompensatorBank:
-    """A bank of filters, one a unit, that run side by side, each from a fresh start.
+    """A bank of filters, one per unit, that run together, each from its initial state.
 
     Parameters
     ----------
@@ -143,7 +144,7 @@ def stack(filters: Sequence[ForceFilter]) -> CompensatorBank:
     Raises
     ------
     UsageError
-        Where there is none, or their rates differ.
+        Where no filter is given, or their rates differ.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""`Calibration`: what was identified of a unit, as a file; and the force that it gives for a recording."""
+"""`Calibration`: a unit's identified model as a file, and the force it gives for a recording."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from smartshoe.units import NEWTON, Unit, declared, find_unit
 
 SCHEMA = "smartshoe.calibration/1"
 ESTIMATE_NAME = "force_estimate"
-USUAL_FULL_SCALE_N = 800.0  # of the paper's protocols
+USUAL_FULL_SCALE_N = 800.0  # peak load of the paper's protocols
 
 
 @dataclass(frozen=True)
 class Calibration:
     """A unit's identified model: force = (b0 s + b1)/(s + a1) (reading - offset), Chinimilli 2016 (13).
 
-    ``offset`` in ``reading_unit``; ``parameters`` and ``covariance`` (in their order) as identified; ``scale`` in N
-    per reading unit; ``load_range_n`` and ``rate_range_n_per_s`` what was seen; ``sources`` name and sha256 of the
-    files; ``created`` an ISO date that the caller gives, '' where not known. ``unit`` is where the unit sits
-    ("left_toe"), ``serial_number`` which one it is, '' where not known. ``extended`` is the model with effects, whose
-    linear part the coefficients are; where there is one, it gives the force. ``twin`` is the model that simulates the
-    unit forward, where that is not the one whose inverse gives the force.
+    ``offset`` is in ``reading_unit``; ``parameters`` and ``covariance`` (in their order) are as identified; ``scale``
+    is in N per reading unit. ``load_range_n`` and ``rate_range_n_per_s`` are the ranges seen in the identification;
+    ``sources`` holds name and sha256 of the files; ``created`` is an ISO date given by the caller, '' where not known.
+    ``unit`` is the place of the unit ("left_toe"), ``serial_number`` identifies it, '' where not known. ``extended`` is
+    the model with effects, with the coefficients as its linear part; where it is given, it gives the force. ``twin`` is
+    the model that simulates the unit forward, where that is not the one whose inverse gives the force.
     """
 
     a1: float
@@ -81,7 +81,7 @@ class Calibration:
             )
 
     def compensator(self, sample_rate_hz: float | None = None) -> ForceFilter:
-        """The filter at ``sample_rate_hz``, the calibration's own rate where none is given.
+        """The filter at ``sample_rate_hz``, by default the calibration's own rate.
 
         A `Compensator`, or an `ExtendedCompensator` where there is an extended model.
         """
@@ -93,9 +93,9 @@ class Calibration:
         )
 
     def model(self) -> ExtendedModel:
-        """The model that simulates this unit forward: its twin, the extended one, or the linear part as one.
+        """The model that simulates this unit forward: the twin, else the extended model, else the linear part.
 
-        Raises `InputError` where the coefficients are no passive solid.
+        Raises `InputError` where the coefficients do not describe a passive solid.
         """
         forward = self.twin or self.extended
         if forward is not None:
@@ -113,9 +113,9 @@ class Calibration:
         return linear.with_part(shift_of("reading"), np.array([self.offset / reading]))
 
     def to_dict(self) -> dict[str, Any]:
-        """The file's object, schema smartshoe.calibration/1; no NaN, no infinity.
+        """The calibration as a JSON object, schema smartshoe.calibration/1; without NaN or infinity.
 
-        The keys ``serial_number``, ``extended`` and ``twin`` stand there only where the calibration has them.
+        The keys ``serial_number``, ``extended`` and ``twin`` are present only where the calibration has them.
         """
         found: dict[str, Any] = {
             "schema": SCHEMA,
@@ -142,12 +142,12 @@ class Calibration:
         return found
 
     def save(self, path: Path | str) -> None:
-        """Write the calibration as JSON, whole or not at all."""
+        """Write the calibration as JSON, atomically."""
         write_text(path, json_text(self.to_dict()))
 
     @classmethod
     def load(cls, path: Path | str) -> Calibration:
-        """Read a calibration; raises `InputError` naming file and key where it is none or is damaged."""
+        """Read a calibration; raises `InputError` naming file and key where the file is damaged or something else."""
         return cls._from_object(parsed(path), Reader(str(path)))
 
     @classmethod
@@ -200,7 +200,7 @@ class Calibration:
 
 
 def sensor_for(recording: Recording, calibration: Calibration) -> Channel:
-    """The recording's one sensor, or of several the one that carries the calibrated unit's name."""
+    """The recording's only sensor channel, or among several the one named like the calibrated unit."""
     sensors = recording.sensors
     if len(sensors) <= 1:
         return recording.sensor
@@ -214,7 +214,10 @@ def sensor_for(recording: Recording, calibration: Calibration) -> Channel:
 
 
 def calibration_from(given: Any, argument: str = "calibration") -> Calibration:
-    """``given`` as a calibration: it is one, or the path of one's file; raises `UsageError` for anything else."""
+    """``given`` if it is a `Calibration`, or the one in the file at that path.
+
+    Raises `UsageError` for anything else.
+    """
     if isinstance(given, Calibration):
         return given
     if isinstance(given, (str, os.PathLike)):
@@ -260,9 +263,9 @@ def compensate(recording: RecordingLike, calibration: Calibration | str | os.Pat
 def compensated(recording: RecordingLike, calibration: Calibration | str | os.PathLike[str]) -> Recording:
     """``recording`` with the channel ``force_estimate`` in N (column ``force_estimate_n``), finite at every sample.
 
-    An even time base runs the bilinear filter at its own rate, an uneven one the exact response for straight lines
-    between samples. Missing readings hold the last one; ``notes`` count them. Raises `MissingChannelError` without a
-    reading of the unit, `UnitError` where its quantity is not the calibration's.
+    On an even time base the bilinear filter runs at the recording's rate; on an uneven one the exact response to
+    straight lines between samples is used. A missing reading repeats the last one; ``notes`` count them. Raises
+    `MissingChannelError` without a reading of the unit, `UnitError` where its quantity is not the calibration's.
     """
     recording, calibration = recording_of(recording), calibration_from(calibration)
     channel = sensor_for(recording, calibration)
@@ -297,7 +300,7 @@ def compensated(recording: RecordingLike, calibration: Calibration | str | os.Pa
 
 
 def _limits(calibration: Calibration, rate_hz: float) -> list[str]:
-    """What the extended filter leaves in the force, a sentence an effect."""
+    """What the extended filter cannot remove from the force, one sentence per effect."""
     filter_ = calibration.compensator(rate_hz)
     if not isinstance(filter_, ExtendedCompensator):
         return []
@@ -307,7 +310,10 @@ def _limits(calibration: Calibration, rate_hz: float) -> list[str]:
 
 
 def _on_even_steps(time_s: Array, readings: Array, calibration: Calibration) -> tuple[Array, float]:
-    """Force (n,) at uneven ``time_s`` (n,), by way of an even grid as fine as the median step; and the grid's rate."""
+    """Force (n,) at uneven ``time_s`` (n,), computed on an even grid of the median step.
+
+    Also returns the grid's rate.
+    """
     step_s = float(np.median(np.diff(time_s)))
     even_s = time_s[0] + step_s * np.arange(int(np.ceil((time_s[-1] - time_s[0]) / step_s)) + 1)
     present = np.isfinite(readings)
@@ -329,11 +335,11 @@ def extended_calibration(
     sample_rate_hz: float = 100.0,
     created: str = "",
 ) -> Calibration:
-    """The calibration that holds ``model``, and its linear part as a1, b0, b1, offset and delay.
+    """The calibration that holds ``model``, with its linear part as a1, b0, b1, offset and delay.
 
-    From p/f = (s + a)/((1 + kappa) s + a) of the model and reading = gain p: a1 = a, b0 = (1 + kappa) F/(G R) and
-    b1 = a F/(G R), with F/(G R) full-scale load over gain times full-scale reading in N per reading unit, which is
-    also the calibration's ``scale``. ``parameters`` and ``covariance`` go together, as in `Calibration`.
+    From p/f = (s + a)/((1 + kappa) s + a) of the model and reading = gain p: a1 = a, b0 = (1 + kappa) F/(G R) and b1 =
+    a F/(G R). F/(G R), the full-scale load over gain times full-scale reading, is in N per reading unit and is also the
+    calibration's ``scale``. ``parameters`` and ``covariance`` belong together, as in `Calibration`.
     """
     from smartshoe.version import __version__
 

@@ -1,4 +1,4 @@
-"""The paper's compensator: equation (13) under the bilinear transform, whole signals and streams alike."""
+"""The paper's compensator: equation (13) under the bilinear transform, for whole signals and streams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from smartshoe.units import Unit
 class Compensator(ForceFilter):
     """force = (b0 s + b1)/(s + a1) (reading - offset), Chinimilli 2016 (13), bilinear at ``sample_rate_hz``.
 
-    Start, missing readings and streams are those of `ForceFilter`.
+    Its start and its handling of missing readings and streams are those of `ForceFilter`.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Compensator(ForceFilter):
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: start in the steady state of the next reading."""
+        """Return to the initial state: the filter starts in the steady state of the next reading."""
         super().reset()
         self._state = np.zeros(1)
 
@@ -53,12 +53,12 @@ class Compensator(ForceFilter):
         )
 
     def _column(self) -> list[float]:
-        """The filter as a column of a bank, in the order of `smartshoe.kernels.streaming`, with no past."""
+        """The filter in its initial state as a column of a bank, in the order of `smartshoe.kernels.streaming`."""
         n0, n1 = self.numerator
         return [float(n0), float(n1), float(self.denominator[1]), self._static_gain, self.offset, 0.0, np.nan, 0.0]
 
     def _begin(self, first: float) -> None:
-        # y = n0 u + state: the state that makes the first output the static gain's.
+        # With y = n0 u + state, this state makes the first output that of the static gain.
         self._state = np.array([(self._static_gain - self.numerator[0]) * (first - self.offset)])
 
     def _advance(self, readings: Array, count: int) -> Array:

@@ -1,4 +1,4 @@
-"""The linear network of wall and gas run backwards: pressure in, load out, sample by sample."""
+"""The inverse of the linear network of wall and gas: load from pressure, sample by sample."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from smartshoe.models.core import Core
 from smartshoe.models.effects.effect import CStep, Inverse
 
 RINGING = -0.5
-"""An eigenvalue of the inverse below this changes sign at each sample and dies slowly: noise would ring."""
+"""An eigenvalue of the inverse below this changes sign at each sample and decays slowly: noise would ring."""
 
 
 class CoreInverse(Inverse):
     """`Core.recursion` solved for the new load, which is exact for loads that are straight lines between samples.
 
-    With z_k = A z_(k-1) + b f_(k-1) + c f_k and p = direct f + read . z, the stored state is what z will be
-    without the new load, s_k = z_k - c f_k. Where the sampling is so coarse that this recursion rings (`RINGING`),
-    the bilinear transform of the network takes its place: ``is_exact`` is then False. It never rings beyond bound,
-    as the network's zeros do not grow with time.
+    With z_k = A z_(k-1) + b f_(k-1) + c f_k and p = direct f + read . z, the stored state is z without the contribution
+    of the new load, s_k = z_k - c f_k. Where the sampling is so coarse that this recursion rings (`RINGING`), the
+    bilinear transform of the network replaces it, and ``is_exact`` is False. Its ringing stays bounded, as the
+    network's zeros do not grow with time.
     """
 
     def __init__(self, core: Core, step_s: float) -> None:
@@ -46,13 +46,13 @@ class CoreInverse(Inverse):
         return float(np.min(np.real(own), initial=np.inf))
 
     def reset(self) -> None:
-        """Start in the steady state of the next pressure, nothing leaked."""
+        """Start in the steady state of the next pressure, with no accumulated leak."""
         self._state: Array | None = None
 
     def push(self, signal: Array, time_s: Array) -> Array:
-        """Load (n,) from pressure (n,), shares of full scale."""
+        """Load (n,) from pressure (n,), both as shares of full scale."""
         if self._push is None:
-            return signal  # a spring alone: pressure and load are one share
+            return signal  # a spring alone: pressure and load are the same share of full scale
         if not signal.size:
             return signal.copy()
         if self._state is None:
@@ -62,7 +62,7 @@ class CoreInverse(Inverse):
         return load
 
     def c_step(self, name: str) -> CStep:
-        """The same sums in the same order."""
+        """C99 code of the recursion, with the same sums in the same order."""
         if self._push is None:
             return CStep({}, f"x /= {self.direct!r};")
         states, lines = self._solved(name)
@@ -74,7 +74,10 @@ class CoreInverse(Inverse):
         return self._step(name, states, lines)
 
     def c_single(self, name: str) -> CStep:
-        """By increments: a slow state's transition is 1 less a little, of which single precision keeps four digits."""
+        """C99 code by increments of the state, for single precision.
+
+        A slow state's transition is just below 1, of which single precision would keep only four digits.
+        """
         if self._push is None:
             return self.c_step(name)
         states, lines = self._solved(name)
@@ -86,7 +89,7 @@ class CoreInverse(Inverse):
         return self._step(name, states, lines)
 
     def _solved(self, name: str) -> tuple[list[str], list[str]]:
-        """Names of the states, and the lines that begin them and turn the pressure x into the load."""
+        """Names of the states, and the C lines that initialise them and turn the pressure x into the load."""
         states = [f"{name}_{i}" for i in range(self.read.size)]
         begun = f"{name}_begun"
         lines = [f"if (!(f->{begun} > 0.0)) {{"]
@@ -101,7 +104,7 @@ class CoreInverse(Inverse):
 
 
 def _bilinear(core: Core, step_s: float) -> tuple[Array, Array, Array]:
-    """A, b, c of `Core.recursion` by the trapezoidal rule."""
+    """A, b, c as in `Core.recursion`, by the trapezoidal rule."""
     half = 0.5 * step_s * core.matrix
     one = np.eye(half.shape[0])
     pushed = np.asarray(np.linalg.solve(one - half, 0.5 * step_s * core.drive), dtype=float)

@@ -1,4 +1,4 @@
-"""The extended model run backwards: readings in, force out, hysteresis, curves, lag and drift undone on the way."""
+"""The extended model inverted: force from readings, undoing hysteresis, curves, lag and drift."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ HOUR_S = 3600.0
 
 
 class ExtendedCompensator(ForceFilter):
-    """The inverse of an `ExtendedModel`'s chain, block by block, last block first, at ``sample_rate_hz``.
+    """The inverse of an `ExtendedModel`'s chain at ``sample_rate_hz``: the inverse blocks, in reverse order.
 
-    ``not_inverted``: effect to one sentence, for those that are passed over because nothing can undo them on a
-    stream. ``cautions``: effect to one sentence, for those whose inverse asks something of the readings. Time, which
-    drifts need, is counted from the first reading on top of ``started_s``, the seconds for which the unit has been
-    on. Start, missing readings and streams are those of `ForceFilter`; at the start nothing has leaked, nothing is
-    worn. Raises `UsageError` for a rate that is not positive.
+    ``not_inverted`` maps effects that cannot be undone on a stream, and are therefore skipped, to one sentence each.
+    ``cautions`` maps effects whose inverse makes demands on the readings to one sentence each. Time, which drifts
+    depend on, is counted from the first reading, plus ``started_s``, the seconds for which the unit has already been
+    on. The start and the handling of missing readings and streams are those of `ForceFilter`; at the start no leak or
+    wear has accumulated. Raises `UsageError` for a rate that is not positive.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ExtendedCompensator(ForceFilter):
         self.core = CoreInverse(model.core, self.step_s)
         self._blocks: list[tuple[str, Inverse]] = []
         self._passed_over: dict[str, str] = {}
-        self._noise = model.noise / model.gain  # of the signal, as far as it is undone
+        self._noise = model.noise / model.gain  # of the signal, as far as it has been undone
         leaks = (part for part in model.parts if part.effect.is_leak)
         self._moved: dict[str, float] = {}
         self._left_s: dict[str, float] = {}
@@ -74,7 +74,7 @@ class ExtendedCompensator(ForceFilter):
         self.reset()
 
     def _undo(self, part: Part) -> None:
-        # A tone's phase belongs to the session it was fitted on, so that noise is never taken off.
+        # Noise is never subtracted: even a tone's phase belongs to the session it was fitted on.
         arm = Arm(self.model.relaxing_share, self.model.relaxation_rate_per_s)
         chain = ChainContext(arm, self._noise)
         inverse = part.effect.inverse_within(chain, part.values, self.step_s) if part.effect.is_physical else None
@@ -105,7 +105,7 @@ class ExtendedCompensator(ForceFilter):
 
     def _undo_core(self) -> None:
         self._blocks.append(("core", self.core))
-        self._noise *= 1.0 + max(self.model.relaxing_share, 0.0)  # what a sudden load reads less than a held one
+        self._noise *= 1.0 + max(self.model.relaxing_share, 0.0)  # a sudden load reads less than a held one by this
         if not self.core.is_exact:
             self._cautions["baseline"] = (
                 f"{self.sample_rate_hz:g} Hz is coarse for this relaxation: the bilinear transform stands in for the"
@@ -113,7 +113,7 @@ class ExtendedCompensator(ForceFilter):
             )
 
     def reset(self) -> None:
-        """Forget the past: start in the steady state of the next reading, and time begins again."""
+        """Return to the initial state: start in the steady state of the next reading, with time at its beginning."""
         super().reset()
         for _, inverse in self.blocks:
             inverse.reset()
@@ -124,12 +124,12 @@ class ExtendedCompensator(ForceFilter):
         )
 
     def _begin(self, first: float) -> None:
-        """Each block begins with the first value that reaches it."""
+        """Initialise each block with the first value that reaches it."""
 
     def _advance(self, readings: Array, count: int) -> Array:
         time_s: Array = self.started_s + np.arange(count, count + readings.size, dtype=float) * self.step_s
         signal = readings / self.reading_per_share
-        # Far beyond full scale a curve may have no load that gives the reading: it is passed over there.
+        # Far beyond full scale no load may give the reading through a curve; the curve is skipped there.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             for name, inverse in self.blocks:
                 undone = inverse.push(signal, time_s)
@@ -139,7 +139,7 @@ class ExtendedCompensator(ForceFilter):
         return np.asarray(self.model.full_scale_load_n * signal)
 
     def c_steps(self, *, single: bool = False) -> tuple[tuple[str, CStep], ...]:
-        """Every block's name and C99, in the order in which they run, between the two scalings.
+        """Name and C99 code of every block, in the order in which they run, between the two scalings.
 
         ``single`` asks for the form that loses least in single precision, still written in doubles.
         """
@@ -149,10 +149,9 @@ class ExtendedCompensator(ForceFilter):
 
 
 def _moved_by_the_clock(inverse: Inverse, started_s: float, until_s: float) -> float:
-    """By what share of full scale a full-scale signal comes out otherwise an hour on, of what looks at the time alone.
+    """The change of a full-scale signal within an hour (share of full scale) from an inverse that depends only on time.
 
-    Of what is held from ``until_s`` on, from then on. What is summed up from the readings besides has no such share: it
-    goes by them.
+    If the drift is held from ``until_s`` on, the change until then. 0 for an inverse that depends on the readings.
     """
     if not isinstance(inverse, Memoryless):
         return 0.0
@@ -162,7 +161,7 @@ def _moved_by_the_clock(inverse: Inverse, started_s: float, until_s: float) -> f
 
 
 def _going_on(part: Part, moved: float) -> str:
-    """What a drift asks of whoever uses the filter; ``moved``: that of `_moved_by_the_clock`."""
+    """The caution about a drift for the filter's user; ``moved`` as returned by `_moved_by_the_clock`."""
     by = f"moves a full-scale force by {significant(100.0 * moved, 2)} %"
     if math.isfinite(part.until_s):
         return (

@@ -1,4 +1,4 @@
-"""What every filter from readings to force has in common: whole signals, streams, and missing readings."""
+"""The common base of all filters from readings to force: whole signals, streams, and missing readings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ForceFilter(ABC):
 
     @abstractmethod
     def _copy(self) -> Self:
-        """The same filter without a past."""
+        """A copy of this filter in its initial state."""
 
     @abstractmethod
     def _begin(self, first: float) -> None:
@@ -42,7 +42,7 @@ class ForceFilter(ABC):
         return f"<{type(self).__name__} at {self.sample_rate_hz:g} Hz{of}>"
 
     def reset(self) -> None:
-        """Forget the past: start in the steady state of the next reading."""
+        """Return to the initial state: the filter starts in the steady state of the next reading."""
         self._last: float | None = None
         self._missing = 0
         self._count = 0
@@ -53,10 +53,10 @@ class ForceFilter(ABC):
         return self._missing
 
     def apply(self, readings: ArrayLike | Channel | Recording) -> Array:
-        """Force (n,) in N of a whole signal (n,), from a fresh start; the state of `push` stays as it is.
+        """Force (n,) in N of a whole signal (n,), from the initial state; the state of `push` is not changed.
 
-        A `Channel`, or the one sensor of a `Recording`, is converted to ``reading_unit``; raises `UnitError` where
-        that cannot be, and `UsageError` where a recording has another rate than the filter.
+        A `Channel`, or the only sensor of a `Recording`, is converted to ``reading_unit``. Raises `UnitError` where
+        that is not possible, and `UsageError` where the recording's rate differs from the filter's.
         """
         if isinstance(readings, Recording):
             self._require_rate_of(readings)
@@ -70,7 +70,7 @@ class ForceFilter(ABC):
         return self._copy()._push_block(values)
 
     def _require_rate_of(self, recording: Recording) -> None:
-        """Raises `UsageError` where each sample would be taken for longer, or shorter, than it lasted."""
+        """Raise `UsageError` where the recording's sampling rate differs from the filter's."""
         if len(recording) < 2 or abs(recording.sample_rate_hz / self.sample_rate_hz - 1.0) <= SAME_STEP:
             return
         raise UsageError(
@@ -112,6 +112,6 @@ class ForceFilter(ABC):
             np.maximum.accumulate(index, out=index)
             values = np.where(index >= 0, values[index], self._last)
         self._last = float(values[-1])
-        # One code path for floats and blocks, so that any chunking gives the same bits.
+        # One code path for floats and blocks, so that the result is bit-equal for any chunking.
         force_n[start:] = self._advance(values, count + start)
         return force_n

@@ -1,4 +1,4 @@
-"""A bound on how much an inverse may raise noise: low-passes behind it, no slower than the bound asks for."""
+"""Limits how much an inverse amplifies noise, by low-passes behind it that are no slower than necessary."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CStep, Inverse
 
 MOST = 3.0
-"""Times that a block may raise what alternates from sample to sample. Undoing a lag of T raises it 1 + 2 T/step times:
-without a bound, ever more as the sampling gets finer. For lags of 5 to 60 ms at 100 and 500 Hz and noise of 0.05 and
+"""Largest gain of a block for a signal that alternates from sample to sample. Undoing a lag T has 1 + 2 T/step,
+which without a bound grows as the sampling gets finer. For lags of 5 to 60 ms at 100 and 500 Hz and noise of 0.05 and
 0.1 % of full scale, 3 to 5 leave the least error of the force on the paper's triangles."""
 
 
 def noise_gain(inverse: Inverse) -> float:
-    """How much a linear ``inverse`` raises a signal that alternates from sample to sample; it is reset."""
+    """The gain of a linear ``inverse`` for a signal that alternates from sample to sample; resets the inverse."""
     inverse.reset()
     answer = inverse.push(np.resize([1.0, -1.0], 64), np.zeros(64))
     inverse.reset()
@@ -22,10 +22,10 @@ def noise_gain(inverse: Inverse) -> float:
 
 
 class NoiseLimit(Inverse):
-    """Two first-order low-passes in a row, so that an alternating signal is passed ``gain`` (0 to 1) times.
+    """Two first-order low-passes in series that together pass an alternating signal with ``gain`` (0 to 1).
 
-    Each is y_k = w x_k + (1 - w) y_(k-1): it passes w/(2 - w) of an alternating signal and a hold as it is, and a ramp
-    comes 1/w - 1 steps late. Two are late by far less than one of the same bound.
+    Each is y_k = w x_k + (1 - w) y_(k-1): it scales an alternating signal by w/(2 - w), leaves a constant as it is, and
+    delays a ramp by 1/w - 1 steps. Two cause a far shorter delay than a single one of the same gain.
     """
 
     def __init__(self, gain: float) -> None:
@@ -52,7 +52,7 @@ class NoiseLimit(Inverse):
         return signal
 
     def c_step(self, name: str) -> CStep:
-        """The same sums."""
+        """C99 code with the same sums."""
         first, second, begun, keep = f"{name}_first", f"{name}_second", f"{name}_begun", repr(1.0 - self.weight)
         body = f"""{{
     if (!(f->{begun} > 0.0)) {{

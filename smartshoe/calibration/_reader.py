@@ -1,4 +1,4 @@
-"""Typed values out of a calibration's JSON; a fault names file and key."""
+"""Reads typed values from a calibration's JSON; errors name file and key."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from smartshoe.models.parameter import Parameter
 
 
 def parsed(path: Path | str) -> Any:
-    """The file's JSON; raises `InputError` naming it where it is no text, cannot be read or is no JSON."""
+    """The content of a JSON file; raises `InputError` naming the file where it cannot be read or is not valid JSON."""
     text = read_text(Path(path), "a calibration that identify wrote")
     try:
         return parsed_json(text)
@@ -28,12 +28,12 @@ def parsed(path: Path | str) -> Any:
 
 @dataclass(frozen=True)
 class Reader:
-    """Takes typed values out of a JSON object; a fault names file and key."""
+    """Reads typed values from a JSON object; errors name file and key."""
 
     path: str
 
     def fault(self, key: str, what: str) -> InputError:
-        """The error that says of ``key`` ``what`` is wrong with it."""
+        """The error that reports ``what`` is wrong with ``key``."""
         return InputError(f"{self.path}: key '{key}' {what}: write the file anew with identify --calibration")
 
     def _get(self, found: Mapping[str, Any], key: str, above: str) -> Any:
@@ -42,7 +42,10 @@ class Reader:
         return found[key]
 
     def number(self, found: Mapping[str, Any], key: str, above: str = "") -> float:
-        """The finite number under ``key``; ``above`` is the path of ``found`` in the file, with a full stop."""
+        """The finite number under ``key``.
+
+        ``above`` is the path of ``found`` in the file for messages, with a final full stop.
+        """
         value = self._get(found, key, above)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise self.fault(above + key, f"is {value!r}, not a finite number")

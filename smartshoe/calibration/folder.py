@@ -1,4 +1,4 @@
-"""Calibrations as users have them: objects, the files that ``identify``, ``diagnose`` and ``run`` write, folders."""
+"""Finds calibrations as users have them: objects, files written by ``identify``, ``diagnose`` and ``run``, folders."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def load_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> l
 
 
 def _of_folder(folder: Path) -> list[Calibration]:
-    if is_store(folder):  # which may hold a unit several times, for different days
+    if is_store(folder):  # a store may contain several calibrations of a unit, for different days
         raise InputError(
             f"{folder} is a store: take each unit's calibration out of it, smartshoe calibrations show UNIT"
             f" --out C.json --store {folder}"

@@ -1,4 +1,4 @@
-"""Where a calibration comes from: the recordings, by name and content, and the loads and rates that they hold."""
+"""Records where a calibration comes from: its recordings, by name and content, and the loads and rates they cover."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from smartshoe.recording import Recording
 
 RATE_DIGITS = 9
-"""Of a sampling rate, which is one over a step read from a file: 100 Hz, not 100.00000000000213."""
+"""Digits of a sampling rate, the reciprocal of a step read from a file: 100 Hz, not 100.00000000000213."""
 
 
 def without_rounding(rate_hz: float) -> float:
-    """A sampling rate to ``RATE_DIGITS``."""
+    """A sampling rate rounded to ``RATE_DIGITS``, to remove rounding errors."""
     return float(f"{rate_hz:.{RATE_DIGITS}g}")
 
 
@@ -33,10 +33,10 @@ def sha256_of(source: str) -> str | None:
 
 
 def calibrated_on(calibration: Calibration, recordings: Sequence[Recording]) -> Calibration:
-    """``calibration`` with what ``recordings`` (one at least, each with a load) say of its origin.
+    """``calibration`` with its origin filled in from ``recordings`` (at least one, each with a load).
 
     Sets ``load_range_n`` and ``rate_range_n_per_s`` (least and largest load in N, slowest and fastest loading in N/s),
-    ``sample_rate_hz`` (the first recording's) and ``sources``.
+    ``sample_rate_hz`` (that of the first recording) and ``sources``.
     """
     loads = [recording.force_n for recording in recordings]
     sources = [recording.source or recording.name for recording in recordings]

@@ -1,4 +1,4 @@
-"""The command line: ``smartshoe COMMAND``. Each command is a file, imported when it is called."""
+"""The command line ``smartshoe COMMAND``. Each command is a module, imported when it is called."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class _LazyGroup(click.Group):
         from smartshoe.files.shipped import shipped
 
         pages = shipped("docs")
-        if pages is not None:  # in one piece, so that it can be copied
+        if pages is not None:  # on one line, so that it can be copied
             formatter.write(f"\n  The documentation, as plain text, begins with tour.md in\n  {pages}\n")
 
 
@@ -94,9 +94,9 @@ def group() -> None:
     """Calibrate, identify and compensate shoe-embedded air pressure sensors, on real and simulated devices."""
 
 
-SELDOM = 100_000  # objects made between two looks for what is not used any more
+SELDOM = 100_000  # objects created between two garbage collections
 _LONGEST_LINE = 280
-_LONGEST_END = 110  # where a message says how to mend it
+_LONGEST_END = 110  # kept from the end of a message, which says how to fix the problem
 
 
 def _one_line(text: str) -> str:
@@ -109,7 +109,7 @@ def _one_line(text: str) -> str:
 
 @dataclass(slots=True)
 class _Common:
-    """What any command takes at any place of its line: ``--debug``, ``--quiet``, ``--verbose``, ``--limit``."""
+    """Options that every command accepts anywhere: ``--debug``, ``--quiet``, ``--verbose``, ``--limit``."""
 
     debug: bool = False
     talk: Talk = "usual"
@@ -117,7 +117,7 @@ class _Common:
 
 
 def _of_every_command(arguments: Sequence[str]) -> tuple[list[str], _Common]:
-    """The command line without what is common, and that."""
+    """The command line without the options common to all commands, and these options."""
     words: list[str] = []
     common = _Common()
     waiting = iter(arguments)
@@ -146,7 +146,7 @@ def run_command(arguments: Sequence[str]) -> int:
         result: Any = group.main(args=words, prog_name="smartshoe", standalone_mode=False)
         return result if isinstance(result, int) else 0
     except BrokenPipeError:
-        # The reader of our output went away (head, less): no fault of the command.
+        # The reader of our output (head, less) closed it, which is no error of the command.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
@@ -158,7 +158,7 @@ def run_command(arguments: Sequence[str]) -> int:
 
 
 def _reported(error: Exception) -> int:
-    """Print what ended a command as one sentence; the exit status."""
+    """Print the error that ended a command as one sentence; returns the exit status."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(f"{error.format_message()}\n", err=True)
         error = click.UsageError("no command is given: name one of these", error.ctx)
@@ -185,7 +185,7 @@ def _reported(error: Exception) -> int:
 
 
 def _of_other_packages(error: Exception) -> str:
-    """The sentence about an effect of another package that failed, '' where none did."""
+    """The sentence about an effect of another package that failed, or ''."""
     from smartshoe.models.effects import failure_of_others
 
     return failure_of_others(error)
@@ -193,10 +193,10 @@ def _of_other_packages(error: Exception) -> str:
 
 def main() -> None:
     """Entry point of the ``smartshoe`` command."""
-    # Most of what a command makes stays to its end: to look through it every 700 objects takes 7 % of a run.
+    # Most objects live until a command ends: collecting garbage every 700 objects would take 7 % of a run.
     gc.set_threshold(SELDOM)
-    # At the end the system takes all memory back at once; Python would free every object first.
+    # At the end the system reclaims all memory at once; Python would free every object first.
     atexit.register(gc.freeze)
-    # Workers are started by `python -m`, which would import a numpy.py that lies where the command is called.
+    # Workers are started by `python -m`, which would import a numpy.py in the current folder.
     os.environ["PYTHONSAFEPATH"] = "1"
     sys.exit(run_command(sys.argv[1:]))

@@ -1,4 +1,4 @@
-"""What a person should know of a calibration beside recordings, before using its forces."""
+"""Warnings about using a calibration on given recordings, before its forces are used."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
     from smartshoe.recording import Recording
 
-BEYOND = 1.1  # of the largest load that a calibration has seen
-FASTER = 2.0  # than the fastest loading that it has seen
-OFF_SHARE, OFF_TIMES = 0.05, 2.0  # of the largest load, and times what the fit left: more is worth a warning
+BEYOND = 1.1  # times the largest load that a calibration has seen
+FASTER = 2.0  # times the fastest loading that it has seen
+OFF_SHARE, OFF_TIMES = 0.05, 2.0  # of the largest load, and times the fit's error: more causes a warning
 
 
 def warn_of_a_past(recordings: Sequence[Recording], calibration: Calibration) -> None:
-    """A warning on stderr for each recording that carries on from another, where the calibration has effects."""
+    """Warn on stderr for each recording that continues another one, where the calibration has effects."""
     for recording in recordings:
         earlier = recording.metadata.get("continues")
         if earlier is not None and calibration.extended is not None:
@@ -29,7 +29,7 @@ def warn_of_a_past(recordings: Sequence[Recording], calibration: Calibration) ->
 
 
 def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:
-    """A warning on stderr for each recording that says it is of another unit, or whose load passes what was seen."""
+    """Warn on stderr for each recording that names another unit, or whose load exceeds the calibrated range."""
     for recording in recordings:
         if recording.unit and calibration.unit and recording.unit != calibration.unit:
             warn(
@@ -50,7 +50,7 @@ def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibrati
 
 
 def warn_of_forces_beyond(label: str, time_s: Array, force_n: Array, calibration: Calibration) -> None:
-    """A warning on stderr where the forces (n,) that a calibration gave pass the loads, or the rates, it has seen."""
+    """Warn on stderr where the calibration's forces (n,) exceed the loads or loading rates that it has seen."""
     from smartshoe.signals.loading import rate_range
 
     seen, top_n = calibration.load_range_n, float(force_n.max(initial=0.0))
@@ -68,10 +68,11 @@ def warn_of_forces_beyond(label: str, time_s: Array, force_n: Array, calibration
 
 
 def warn_of_use_from_rest(recordings: Sequence[Recording], calibration: Calibration, told_n: float) -> None:
-    """A warning on stderr where a calibration is far off on the very recordings that it was fitted to.
+    """Warn on stderr where a calibration is far off on the very recordings that it was fitted to.
 
-    It begins each in a steady state and takes one zero for all, which a fit does not: where a unit leaks or drifts, a
-    zero far off and a past that takes it back may fit best. ``told_n``: rms error in N by the fit, NaN where unknown.
+    In use each recording begins in a steady state, and all share one zero; in a fit they do not. Where a unit leaks or
+    drifts, the best fit may have a distant zero and a past that compensates for it. ``told_n``: rms error in N by the
+    fit, NaN where unknown.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Progress of many equal pieces of work, with the time that is left."""
+"""A progress bar for many equal pieces of work, with the remaining time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def counting(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar that is given (done, whole), on a terminal; nothing elsewhere."""
+    """Yield a function of (done, total) that updates a bar on a terminal, and does nothing elsewhere."""
     if not sys.stderr.isatty():
         yield lambda _done, _whole: None
         return

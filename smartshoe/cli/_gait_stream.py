@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
     from smartshoe.gait import Coverage
 
-LARGE_BYTES = 64 << 20  # some forty minutes of two shoes; whole in memory they take about a gigabyte
+LARGE_BYTES = 64 << 20  # some forty minutes of two shoes, which take about a gigabyte in memory
 
 
 def is_streamed(files: Sequence[str], chosen: bool | None) -> bool:
-    """Whether the trial in ``files`` goes through as a stream: as ``chosen``, else where they are large."""
+    """Whether the trial in ``files`` is processed as a stream: as ``chosen``, by default where the files are large."""
     if chosen is not None:
         return chosen
     from smartshoe.files.logs import detect
@@ -29,7 +29,7 @@ def is_streamed(files: Sequence[str], chosen: bool | None) -> bool:
 
 
 def refuse_with(options: dict[str, str | None]) -> None:
-    """Raises `UsageError` for options that need the whole trial in memory."""
+    """Raise `UsageError` for options that need the whole trial in memory."""
     given = [name for name, value in options.items() if value is not None]
     if given:
         raise UsageError(
@@ -48,7 +48,7 @@ def gait_of_stream(
     folder: Path | None,
     estimator: str | None,
 ) -> None:
-    """Analyse ``files`` in bounded memory and say what was found."""
+    """Analyse ``files`` in bounded memory, then print and write the results."""
     from smartshoe.cli._output import emit_json, progress
     from smartshoe.files.atomic import json_text, write_text
     from smartshoe.files.logs.blocks import read_blocks

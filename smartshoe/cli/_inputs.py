@@ -1,4 +1,4 @@
-"""The options by which any command learns which columns of a file are what."""
+"""Reads the input files of commands, with the options that choose their columns."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import click
 from smartshoe.cli._output import warn
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
 
-MISSING_SHARE = 0.05  # of a signal's samples, from which on it is reported
+MISSING_SHARE = 0.05  # of a signal's samples: more missing ones are reported
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def column_options(command: _F) -> _F:
-    """Add --time, --force, --sensor and --unit."""
+    """Add the options --time, --force, --sensor and --unit to a command."""
     for decorate in (
         click.option("--unit", metavar="NAME", help="The sensing unit's name, for example left_toe."),
         click.option(
@@ -46,7 +46,7 @@ def column_options(command: _F) -> _F:
 def read_all(
     files: Sequence[str], *, time: str | None, force: str | None, sensors: Sequence[str], unit: str | None
 ) -> list[Recording]:
-    """Every experiment as a recording; a machine's log and a data logger's are joined. Notes go to stderr."""
+    """Every experiment as a recording; a machine's log and a data logger's are joined. Prints notes to stderr."""
     from smartshoe.cli._output import show_notes
     from smartshoe.devices.joining import join_pairs
     from smartshoe.errors import MissingChannelError
@@ -58,7 +58,7 @@ def read_all(
         except MissingChannelError:
             if len(files) == 1:
                 raise
-            # One of two logs of a test may hold the load only, or the reading only.
+            # One of two logs of a test may contain only the load, or only the reading.
             half = read(file, time=time, force=force, sensors=list(sensors), unit=unit, partly=True)
             if bool(half.of_role("load")) == bool(half.sensors):
                 raise
@@ -71,7 +71,7 @@ def read_all(
 
 
 def _each_once(files: Sequence[str]) -> list[str]:
-    """``files`` without those named twice: the same samples again would be evidence that is not there."""
+    """``files`` without repetitions, since the same samples are not independent evidence."""
     found: dict[Path, str] = {}
     for file in files:
         place = Path(file).resolve()
@@ -82,7 +82,7 @@ def _each_once(files: Sequence[str]) -> list[str]:
 
 
 def say_what_strikes(recordings: Sequence[Recording]) -> None:
-    """A warning on stderr for each load that looks negated, and for each signal that lacks much of its samples."""
+    """Warn on stderr for each load that looks negated, and for each signal that lacks many of its samples."""
     from smartshoe.files.logs.columns import is_negative
 
     for recording in recordings:
@@ -100,7 +100,7 @@ def say_what_strikes(recordings: Sequence[Recording]) -> None:
 
 
 def units_of(choices: Sequence[str]) -> dict[str, str]:
-    """``UNIT=COLUMN`` choices as columns by unit; raises `UsageError` for a unit that no shoe has."""
+    """Choices ``UNIT=COLUMN`` as columns by unit; raises `UsageError` for a unit that no shoe has."""
     from smartshoe.errors import UsageError
 
     found: dict[str, str] = {}
@@ -115,7 +115,7 @@ def units_of(choices: Sequence[str]) -> dict[str, str]:
 def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
     """The recording with the named columns as the units' readings; a column may have its unit in brackets.
 
-    Raises `MissingChannelError` for one not there, `UnitError` for a unit that is not known or not the file's.
+    Raises `MissingChannelError` for a missing column, `UnitError` for an unknown unit or one that is not the file's.
     """
     for unit, column in columns.items():
         channel = _channel_of(recording, column, unit)
@@ -124,7 +124,7 @@ def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
 
 
 def _channel_of(recording: Recording, column: str, unit: str) -> Channel:
-    """The channel that ``column`` names, in the unit that stands in brackets where the file gives none."""
+    """The channel that ``column`` names; its unit is that in brackets where the file gives none."""
     from smartshoe.display import first_names
     from smartshoe.errors import MissingChannelError, UnitError
     from smartshoe.units import find_unit

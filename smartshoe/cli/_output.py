@@ -1,4 +1,4 @@
-"""What commands share on their way out: JSON, notes, progress."""
+"""Output shared by commands: JSON, notes, warnings, progress."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ figures_option = click.option(
 def require_writable(
     *files: str | None, json_path: str | None = None, folder: str | None = None, read: Iterable[str] = ()
 ) -> None:
-    """Refuse with `UsageError`, before anything is computed, what could not be written at the end, or should not be.
+    """Raise `UsageError`, before anything is computed, for outputs that cannot or should not be written.
 
-    ``files`` and ``json_path`` are to be written (None: not asked for; of ``json_path`` alone ``-`` is stdout), some
-    of them perhaps in ``folder``, which is made where it is missing. None of them may be one of those that are
-    ``read``, which a result would replace, or another result.
+    ``files`` and ``json_path`` are to be written (None: not requested; ``-`` is stdout, for ``json_path`` only), some
+    of them perhaps in ``folder``, which is created where it is missing. None may be one of the input files ``read``,
+    which it would replace, or equal another output.
     """
     from smartshoe.errors import UsageError
 
@@ -51,13 +51,13 @@ def require_writable(
         if Path(path).is_dir():
             raise UsageError(f"{path} is a directory: give the name of a file to write")
         place = Path(path).resolve()
-        if place in taken and (place.is_file() or not place.exists()):  # a device keeps nothing
+        if place in taken and (place.is_file() or not place.exists()):  # a device may be written to twice
             raise UsageError(f"{path} {taken[place]}: give another name to write to")
         taken[place] = "is to hold two results"
 
 
 def _refuse_no_name(*files: str | None) -> None:
-    """Raise `UsageError` for an empty name, as of a script's variable that was never set, and for ``-``."""
+    """Raise `UsageError` for ``-`` and for an empty name, as of a script's variable that was never set."""
     from smartshoe.errors import UsageError
 
     if "" in files:
@@ -69,7 +69,7 @@ def _refuse_no_name(*files: str | None) -> None:
 
 
 def emit_json(result: dict[str, Any], path: str | None) -> bool:
-    """Write ``result`` to ``path`` (``-``: stdout) where one is given; True where stdout is taken by it."""
+    """Write ``result`` to ``path`` (``-``: stdout) where one is given; returns whether stdout is used for it."""
     if path is None:
         return False
     from smartshoe.files.atomic import json_text, write_text
@@ -82,7 +82,7 @@ def emit_json(result: dict[str, Any], path: str | None) -> bool:
 
 
 def show_notes(recordings: list[Recording]) -> None:
-    """What readers did to the files, on stderr."""
+    """Print on stderr what readers changed in the files."""
     for recording in recordings:
         for said in recording.notes:
             note(f"{recording.label}: {said}")
@@ -93,44 +93,44 @@ talk: ContextVar[Talk] = ContextVar("talk", default="usual")
 
 
 def printable(text: str) -> str:
-    """``text`` as one line without what a terminal would obey: names and cells of files stand in messages."""
+    """``text`` as one line without control characters, since names and cells of files appear in messages."""
     line = " ".join(text.split())
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
 
 
 def note(text: str) -> None:
-    """What a person may want to know, on stderr; nothing with ``--quiet``."""
+    """Print a note for the user on stderr, unless ``--quiet``."""
     if talk.get() != "quiet":
         click.echo(f"note: {printable(text)}", err=True)
 
 
 def warn(text: str) -> None:
-    """What a person should know before using the result, on stderr."""
+    """Print on stderr what the user should know before using the result."""
     click.echo(f"warning: {printable(text)}", err=True)
 
 
 def _nothing(_: object) -> None:
-    """Nothing is reported."""
+    """Ignore a step where no progress is shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShownSteps:
-    """``show`` is given the name of each step; ``of`` how many are still to come, for the time that is left."""
+    """Passes the name of each step to ``show``; ``of`` sets how many are still to come, for the remaining time."""
 
     show: Callable[[str], None] = _nothing
     of: Callable[[int], None] = _nothing
 
     def __call__(self, text: str) -> None:
-        """A step begins."""
+        """Begin a step."""
         self.show(text)
 
 
 @contextmanager
 def progress(total: int | None = None) -> Iterator[ShownSteps]:
-    """A bar with the step's name on a terminal, and the time left where the ``total`` of steps is known.
+    """A bar with the step's name on a terminal, and the remaining time where the ``total`` of steps is known.
 
-    Elsewhere nothing, or with ``--verbose`` a line a step with the seconds since the command began. It is there at
-    once: what a command imports for its work belongs inside.
+    Elsewhere nothing, or with ``--verbose`` one line per step with the seconds since the command began. The bar appears
+    at once, so a command's slow imports belong inside this context.
     """
     if talk.get() == "verbose":
         began = time.monotonic()

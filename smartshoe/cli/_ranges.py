@@ -1,4 +1,4 @@
-"""Numbers on the command line: finite ones within bounds."""
+"""Numbers on the command line: finite and within bounds."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import click
 
 
 class FiniteRange(click.FloatRange):
-    """A range of numbers; click's own lets NaN through, which no comparison refuses, and infinity."""
+    """A range of finite numbers; click's own accepts infinity, and NaN, which fails no comparison."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number; a usage error where it is none, or outside."""
+        """The number; raises a usage error where it is not a number, or outside the range."""
         number: float = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number.", param, ctx)

@@ -1,4 +1,4 @@
-"""Readings of a shoe as they come, on a terminal: one line a unit, drawn anew a few times a second."""
+"""A shoe's live readings on a terminal: one line per unit, redrawn a few times a second."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DRAWN_EVERY_S = 0.1
 
 
 class LiveReadings:
-    """A table on stderr: reading now, lowest and highest so far, and a bar of it."""
+    """A table on stderr: present reading, lowest and highest so far, and a bar."""
 
     def __init__(self) -> None:
         self._console = Console(stderr=True, highlight=False, markup=False)
@@ -36,11 +36,11 @@ class LiveReadings:
         self._live.__exit__(kind, error, at)
 
     def print(self, sentence: str) -> None:
-        """A sentence that stays, above the table."""
+        """Print a sentence above the table, where it remains."""
         self._console.print(sentence, soft_wrap=True)
 
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
-        """Take a block in; the table is drawn ten times a second at most."""
+        """Add a block; the table is redrawn at most ten times a second."""
         for column, name in enumerate(block.names):
             values = block.readings[~block.missing[:, column], column]
             if values.size:
@@ -56,7 +56,7 @@ class LiveReadings:
         table = Table(box=None, header_style="bold")
         for title in ("unit", f"now ({block.unit.symbol})", "lowest", "highest", ""):
             table.add_column(title, justify="left" if title == "unit" else "right")
-        # One scale for all units, so that the one that is pressed stands out.
+        # One scale for all units, so that the pressed one is conspicuous.
         widest = max((self._high[name] - self._low[name] for name in self._high), default=0.0)
         for column, name in enumerate(block.names):
             low, high = self._low.get(name, 0.0), self._high.get(name, 0.0)

@@ -111,7 +111,10 @@ def command(
 
 
 def _require_own_store(folder: SessionFolder, store: str | None) -> None:
-    """A session folder may come from anybody: it never makes a store where there is none, nor a calibration in it."""
+    """Use the given store, or the session folder's own, which must exist: a folder may come from anybody.
+
+    Raises `UsageError` where it does not.
+    """
     named = folder.plan.store
     if store is not None and store != named:
         folder.plan = replace(folder.plan, store=store)
@@ -140,7 +143,7 @@ def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) 
             raise UsageError("--out is missing: give a new folder for the session's data and results")
         folder = SessionFolder.begin(out_folder, _plan(options))
         if options["store"] is not None:
-            make_folder(options["store"])  # what cannot be written to is reported before anything is pressed
+            make_folder(options["store"])  # fails before anything is pressed if it cannot be written to
         return folder
     given = [name for name in ("shoe", "machine", "unit", "protocols") if options[name]]
     if given or out_folder is not None:
@@ -176,7 +179,7 @@ def _plan(options: dict[str, Any]) -> SessionPlan:
 
 
 def _page(operator: _AtTheMachine, folder: SessionFolder, asks: bool, port: int | None) -> PageOperator:
-    """The same session on a page; raises `UsageError` where the extra ``live`` is not installed."""
+    """An operator that shows the session on a page as well; raises `UsageError` without the extra ``live``."""
     try:
         from smartshoe.live.guide import PageOperator
     except ImportError as error:
@@ -188,14 +191,14 @@ def _page(operator: _AtTheMachine, folder: SessionFolder, asks: bool, port: int 
 
 
 class _AtTheMachine:
-    """Instructions on stderr; Enter confirms; live readings where stderr is a terminal."""
+    """The operator at the terminal: instructions on stderr, Enter confirms, live readings if stderr is a terminal."""
 
     def __init__(self, asks: bool, table: Any = None) -> None:
         self.asks, self._table = asks, table
         self._keyboard = _Keyboard()
 
     def streams(self, shoe: Shoe) -> None:
-        """Its readings come with `show`."""
+        """Do nothing: readings arrive through `show`."""
 
     def tell(self, sentence: str) -> None:
         self._print(sentence)
@@ -231,14 +234,14 @@ def _waiting() -> None:
 
 
 class _Keyboard:
-    """Lines as they are typed, read by one thread: an answer that came from elsewhere leaves none behind that reads."""
+    """Typed lines, read by one thread, so that an answer given elsewhere leaves no thread waiting for input."""
 
     def __init__(self) -> None:
         self._lines: SimpleQueue[str] = SimpleQueue()
         self._thread: Thread | None = None
 
     def answer(self, meanwhile: Callable[[], None]) -> str:
-        """The next line; ``meanwhile`` is called until it comes. Raises `click.Abort` at the input's end."""
+        """The next line; ``meanwhile`` is called while waiting. Raises `click.Abort` at the end of input."""
         if self._thread is None:
             self._thread = Thread(target=self._read, daemon=True)
             self._thread.start()

@@ -286,18 +286,18 @@ def retire_command(serial_number: str, date: str | None, note: str, store_folder
 
 def _event(store_folder: str | None, what: str, serial_number: str, date: str | None, note: str) -> None:
     store = _opened(store_folder)
-    store.latest(serial_number)  # a wrong serial number is refused here, not when its history is missed
+    store.latest(serial_number)  # refuses a wrong serial number now rather than later
     event = getattr(store, what)(serial_number, date or _today(), note)
     click.echo(f"unit {serial_number}: {event.says}")
 
 
 def _serial(store: CalibrationStore, unit: str, date: str) -> str:
-    """The serial number that ``unit`` is, or that sits at the place ``unit``."""
+    """The serial number of a unit given by serial number or by the place where it sits."""
     return unit if unit in store.serial_numbers else store.unit_at(unit, date)
 
 
 def _one(store: CalibrationStore, said: str, date: str | None, refuse_expired: bool) -> tuple[str, str, Calibration]:
-    """A calibration by its name, its unit or its file: what to call it, what to say of it, itself."""
+    """A calibration given by its name, its unit or its file: its title, a remark about it, and itself."""
     from smartshoe.calibration import Calibration
     from smartshoe.calibration.store import find
     from smartshoe.calibration.store.dates import moment

@@ -72,7 +72,7 @@ def command(
 
 
 def _print(found: Examination) -> None:
-    """A row a finding; of what is well, a row a kind, with the one that is furthest off."""
+    """Print one row per finding; good results are one row per kind, with the one furthest off."""
     from smartshoe.report.tables import new_console, table_of
 
     table = table_of(f"{found.name}: {found.verdict}", ["check", "unit", "verdict"])

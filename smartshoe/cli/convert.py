@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from smartshoe.recording import Recording
 
 PLAIN = (".csv", ".txt")
-# What the plain table names beside each other; of each quantity the first is what anything else becomes.
+# Units that the plain table can name; for each quantity, others are converted to the first.
 WRITABLE_UNITS = {"force": ("N",), "pressure": ("mbar", "Pa", "kPa", "bar"), "length": ("mm",), "temperature": ("°C",)}
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MOST_NOTES = 10
 NOT_FITTED = "every third load cycle, or part of the time where there are few cycles, not fitted"
-# Steps that usually follow one, without the report. The fits between the first two go on until one adds nothing.
+# Number of steps that usually follow one, without the report. Fits continue until one brings no improvement.
 _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing alternatives": 1}
 
 
@@ -139,7 +139,7 @@ def command(
 
 
 def with_what_is_left(step: ShownSteps, with_report: bool) -> Callable[[str], None]:
-    """``step``, told as well how many steps are usually left: fits go on until nothing is worth another one."""
+    """``step``, extended to report how many steps usually remain: fits continue until none improves the result."""
 
     def show(text: str) -> None:
         step(text)
@@ -150,7 +150,7 @@ def with_what_is_left(step: ShownSteps, with_report: bool) -> Callable[[str], No
 
 
 def _refuse_beside_design() -> None:
-    """Raise `UsageError` for options that mean nothing to a design."""
+    """Raise `UsageError` for options that have no meaning for a design."""
     from smartshoe.errors import UsageError
 
     context = click.get_current_context()
@@ -188,7 +188,7 @@ def _design(path: str, json_path: str | None) -> None:
     for name, protocol in protocols.items():
         if said := too_short_of(protocol, rate_hz):
             raise source.error(("protocol", name), said)
-    if "sim" in schemes():  # a design needs no simulator, and of another machine nobody knows what it stands
+    if "sim" in schemes():  # a design needs no simulator; another machine's limits are not known
         check_machines(scenario, source)
     found = design(tuple(protocols.values()), noise_percent=percent, sample_rate_hz=rate_hz)
     note(f"noise of {percent:g} % of full scale, {said_by}; logged at {rate_hz:g} Hz")
@@ -214,7 +214,10 @@ def _title(recordings: list[Recording], unit: str | None) -> str:
 def _used(
     found: Diagnosis, recordings: list[Recording], others: list[Recording]
 ) -> tuple[list[Recording], list[Recording]]:
-    """Those that were fitted and those that judged, without what was left out; all of them where it was refused."""
+    """The recordings that were fitted and those that judged, without excluded ones.
+
+    All recordings where the diagnosis was refused.
+    """
     if not found.traces:
         return recordings, others
     used = {trace.recording for trace in found.traces}

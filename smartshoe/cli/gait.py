@@ -9,11 +9,11 @@ import click
 
 from smartshoe.cli._output import figures_option
 
-LEAST_WEIGHT_N = 150.0  # of a person who walks: below, it is more likely in kg
+LEAST_WEIGHT_N = 150.0  # of a walking person: a smaller number is probably in kg
 
 
 class _EstimatorOption(click.Option):
-    """Names the estimators that are there when help is asked for: the registry is not read before."""
+    """Lists the available estimators when help is requested; the registry is not read before that."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         from smartshoe.calibration.estimators import estimator_names

@@ -156,7 +156,7 @@ def _range(option: str, name: str, text: str) -> tuple[float, float]:
 def _checks(
     found: Identification, recordings: list[Recording], options: dict[str, Any], step: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Lack of fit and leave-one-rate-out as JSON objects; where the data cannot tell, the reason."""
+    """Lack of fit and leave-one-rate-out as JSON objects, or the reason why the data cannot decide."""
     from smartshoe.errors import NotIdentifiableError
     from smartshoe.identification.lack_of_fit import lack_of_fit
     from smartshoe.identification.leave_out import leave_one_rate_out

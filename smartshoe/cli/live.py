@@ -11,7 +11,7 @@ from smartshoe.cli._output import require_writable
 from smartshoe.cli._ranges import FiniteRange
 from smartshoe.errors import UsageError
 
-LONG_S = 4 * 3600.0  # of a simulated walk, where its address does not say
+LONG_S = 4 * 3600.0  # duration of a simulated walk, unless its address states one
 
 
 @click.command("live", epilog="Example: smartshoe live --shoe sim:walk?side=both --record walk.csv")
@@ -81,7 +81,7 @@ def command(
 
 
 def _lasting(url: str) -> str:
-    """A simulated shoe goes on for hours unless its address says how long."""
+    """The URL with a duration of hours for a simulated shoe, unless it states its own."""
     if not url.startswith("sim:") or "duration_s=" in url:
         return url
     return f"{url}{'&' if '?' in url else '?'}duration_s={LONG_S:g}"

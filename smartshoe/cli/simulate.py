@@ -30,7 +30,7 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
             loaded = loaded.model_copy(update={"seed": seed})
         folder = stack.enter_context(results_folder(out_folder))
         pressed = sum(len(unit.recordings) or len(loaded.protocol) for unit in loaded.unit)
-        step.of(2 * pressed + 2 * (loaded.trial is not None))  # made and written
+        step.of(2 * pressed + 2 * (loaded.trial is not None))  # each is simulated, then written
         made = simulate(loaded, source, step)
         for unit, recordings in made.items():
             for name, recording in recordings.items():

@@ -50,7 +50,7 @@ def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, o
 
 @contextmanager
 def _interrupts(run: _StreamRun) -> Iterator[None]:
-    """Ctrl-C, or a request to end from outside, ends the run after the block it is at, or before the first."""
+    """Let Ctrl-C or a termination request end the run after its present block, or before the first."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -69,7 +69,7 @@ def _interrupts(run: _StreamRun) -> Iterator[None]:
 
 
 class _StreamRun:
-    """Counts and the table of one call."""
+    """Counters and the output table of one call."""
 
     def __init__(self, out: str | None) -> None:
         from smartshoe.runs.session.streaming import StreamTable
@@ -134,7 +134,7 @@ class _StreamRun:
         self._reported = len(events)
 
     def close(self) -> None:
-        """Close the table and say where it is."""
+        """Close the table and print its path."""
         if self.is_stopped:
             click.echo("stopped", err=True)
         if self._table is None:

@@ -1,4 +1,4 @@
-"""The hardware seam: abstract devices and their backends, opened by URL."""
+"""Abstract devices (sensors, bladders, shoes, testing machines) and their backends, opened by URL."""
 
 from smartshoe.devices._base import Bladder, Block, ChannelDescription, Device, Sensor, Shoe, TestMachine
 from smartshoe.devices._events import Disconnected, Dropped, Gap, Reconnected, Restarted, ShoeEvent

@@ -1,7 +1,8 @@
-"""The hardware seam: abstract Sensor, Bladder, Shoe and TestMachine, their lifecycle, channels and limits.
+"""The hardware interface: abstract Sensor, Bladder, Shoe and TestMachine, with their lifecycle, channels and limits.
 
-A backend writes the small ``_..._internal`` methods; the public ones own the lifecycle and the checks. Simulated
-(has physics), replayed (a file through the same calls), logged (a machine's own files) and real are four words.
+A backend writes the small ``_..._internal`` methods; the public ones own the lifecycle and the checks. Four kinds of
+backend have distinct names: simulated (has physics), replayed (plays a file back through the same calls), logged (reads
+a machine's own log files) and real.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ChannelDescription:
-    """What a channel of a device carries: ``range_`` and ``resolution`` in ``unit``, None where not known."""
+    """What a channel of a device measures: ``range_`` and ``resolution`` are in ``unit``, None where not known."""
 
     name: str
     quantity: str
@@ -38,10 +39,11 @@ class ChannelDescription:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Samples of a shoe: ``time_s`` (n,), ``readings`` (n, units) in ``unit``, ``missing`` (n, units).
+    """Consecutive samples of a shoe: ``time_s`` (n,), ``readings`` (n, units) in ``unit``, mask ``missing`` (n, units).
 
-    ``time_s`` is the device's own. A live shoe adds, both (n,) on the host's monotonic clock (`time.perf_counter`),
-    ``arrival_s``, when the bytes came, and ``host_time_s``, the device's time on the fitted clock.
+    ``time_s`` is the device's own time. A live shoe adds two times on the host's monotonic clock (`time.perf_counter`),
+    both (n,): ``arrival_s``, when the bytes arrived, and ``host_time_s``, the device's time converted by the fitted
+    clock.
     """
 
     time_s: Array
@@ -57,7 +59,7 @@ class Block:
 
 
 class Device(ABC):
-    """Open and close, as a context manager; ``describe`` works whether open or not.
+    """A device that is opened and closed, also as a context manager; ``describe`` works whether it is open or not.
 
     Opening twice and using a closed device raise `DeviceError`; closing twice does nothing.
     """
@@ -71,7 +73,7 @@ class Device(ABC):
         return self._is_open
 
     def open(self) -> Self:
-        """Open the device; raises `DeviceError` where it cannot be or already is."""
+        """Open the device; raises `DeviceError` where that fails or the device is already open."""
         if self._is_open:
             raise DeviceError(f"{self} is open already: close it first")
         self._open_internal()
@@ -79,7 +81,7 @@ class Device(ABC):
         return self
 
     def close(self) -> None:
-        """Close the device and let go of what it held."""
+        """Close the device and release its resources; does nothing if it is closed."""
         if self._is_open:
             self._is_open = False
             self._close_internal()
@@ -95,34 +97,37 @@ class Device(ABC):
             raise DeviceError(f"{self} is not open: use it in a with block or call open() first")
 
     def _open_internal(self) -> None:  # noqa: B027  most backends hold nothing
-        """Take what the device needs."""
+        """Acquire what the device needs (ports, files, threads)."""
 
     def _close_internal(self) -> None:  # noqa: B027
-        """Let go of it."""
+        """Release what `_open_internal` acquired."""
 
     @abstractmethod
     def describe(self) -> tuple[ChannelDescription, ...]:
-        """The device's channels: quantity, unit, range, resolution, rate."""
+        """The device's channels, each with quantity, unit, range, resolution and rate."""
 
 
 class Bladder(ABC):
-    """An air bladder: load in, gauge pressure out, with memory."""
+    """An air bladder: load in, gauge pressure out. It remembers its past loads."""
 
     @abstractmethod
     def reset(self) -> None:
-        """Back to rest: unloaded, in steady state, memory forgotten."""
+        """Return to rest: unloaded, in steady state, without memory of past loads."""
 
     @abstractmethod
     def press(self, load_n: Array, sample_rate_hz: float) -> Array:
-        """Gauge pressure (n,) in Pa under the load (n,) in N, both at ``sample_rate_hz``; memory carries on."""
+        """Gauge pressure (n,) in Pa under the load (n,) in N, both at ``sample_rate_hz``.
+
+        Continues from the last call.
+        """
 
 
 class Sensor(ABC):
-    """A gauge pressure sensor: pressure in, reading out, and back by its nominal characteristic."""
+    """A gauge pressure sensor: reading from pressure, and pressure from reading by the nominal characteristic."""
 
     @abstractmethod
     def describe(self) -> ChannelDescription:
-        """What the reading is: its unit, range and resolution."""
+        """The reading's quantity, unit, range and resolution."""
 
     @property
     @abstractmethod
@@ -132,11 +137,11 @@ class Sensor(ABC):
     @property
     @abstractmethod
     def proof_pressure_pa(self) -> float:
-        """The pressure in Pa that the sensor stands without harm."""
+        """The highest pressure in Pa that does not damage the sensor."""
 
     @abstractmethod
     def reset(self) -> None:
-        """Forget the past."""
+        """Return the sensor to its initial state, as if it had not been read before."""
 
     @abstractmethod
     def read(self, pressure_pa: Array, sample_rate_hz: float) -> Array:
@@ -152,19 +157,19 @@ class Shoe(Device):
 
     @abstractmethod
     def _blocks_internal(self) -> Iterator[Block]:
-        """Yield blocks until the stream ends."""
+        """Yield blocks of samples until the stream ends."""
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks of samples in order of time, until the stream ends; raises `DeviceError` where it is not open.
+        """Blocks of samples in order of time, until the stream ends; raises `DeviceError` where the shoe is not open.
 
-        A live shoe that is silent yields an empty block now and then, so that the caller is never stuck.
+        A live shoe that is silent yields an empty block now and then, so that the caller never blocks for long.
         """
         self._require_open()
         yield from self._blocks_internal()
 
     @property
     def events(self) -> tuple[ShoeEvent, ...]:
-        """What befell the stream since it was opened (gaps, reconnections, drops), oldest first."""
+        """Events of the stream since it was opened (gaps, reconnections, dropped samples), oldest first."""
         return ()
 
     @property
@@ -175,10 +180,10 @@ class Shoe(Device):
     @property
     @abstractmethod
     def sample_rate_hz(self) -> float:
-        """Nominal rate of the readings."""
+        """Nominal sampling rate of the readings."""
 
     def record(self, duration_s: float | None = None, name: str = "trial") -> Recording:
-        """Everything that comes, or the first ``duration_s``, as one recording; raises where nothing comes."""
+        """The whole stream, or its first ``duration_s``, as one recording; raises where no sample arrives."""
         blocks: list[Block] = []
         start: float | None = None
         for block in self.blocks():
@@ -203,15 +208,15 @@ class Shoe(Device):
 class TestMachine(Device):
     """A machine that presses one sensing unit and logs load and reading."""
 
-    __test__ = False  # not a test class, whatever pytest makes of the name
+    __test__ = False  # tells pytest that this is not a test class, despite its name
 
     @property
     @abstractmethod
     def limits(self) -> MachineLimits:
-        """What the machine and the sensor on it stand."""
+        """The largest loads and rates that the machine and the sensor under it withstand."""
 
     def check(self, protocol: Protocol) -> None:
-        """Raise `LimitError` where ``protocol`` goes beyond the limits; nothing moves."""
+        """Raise `LimitError` where ``protocol`` exceeds the limits; nothing moves."""
         try:
             protocol.check(self.limits)
             self._check_internal(protocol)
@@ -219,27 +224,27 @@ class TestMachine(Device):
             raise LimitError(f"{self}: {error}") from error
 
     def _check_internal(self, protocol: Protocol) -> None:
-        """A backend's further checks."""
+        """Further checks of a backend; raises where ``protocol`` cannot be run."""
 
     @abstractmethod
     def _run_internal(self, protocol: Protocol) -> Recording:
-        """Carry the protocol out."""
+        """Run the protocol and return its recording."""
 
     def run(self, protocol: Protocol) -> Recording:
-        """Check the protocol, carry it out, and return load, command and reading on one time base."""
+        """Check and run the protocol; returns load, command and reading on one time base."""
         self._require_open()
         self.check(protocol)
         return self._run_internal(protocol)
 
     @property
     def logs(self) -> tuple[Recording, ...]:
-        """The instruments' own logs of the last run, before they were joined."""
+        """The instruments' separate logs of the last run, before they were joined."""
         return ()
 
     @property
     def is_instant(self) -> bool:
-        """Whether ``run`` takes no time of the world's: a machine on a virtual clock."""
+        """Whether ``run`` takes no real time, as for a machine on a virtual clock."""
         return False
 
     def under(self, shoe: Shoe, unit: str) -> None:
-        """Take note that ``unit`` of ``shoe`` lies on the anvil; nothing to do for a machine that really presses."""
+        """Tell the machine that ``unit`` of ``shoe`` lies on the anvil; only a simulated machine needs to know."""

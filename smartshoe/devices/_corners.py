@@ -1,12 +1,12 @@
-"""Delay and clock rate from the corners of the load alone, where no model of the unit's own lag is to be trusted.
+"""Delay and clock rate from the corners of the load alone, for units whose own lag no model describes well enough.
 
-Where the load's slope jumps, the reading's slope jumps at the same instant, whatever the unit's memory: springs,
-dampers, leaks, friction all answer smoothly between corners. Around each corner the reading is fitted by
+Where the load's slope jumps, the reading's slope jumps at the same instant, whatever the unit remembers: springs,
+dampers, leaks and friction all respond smoothly between corners. Around each corner the reading is fitted by
 
     r = cubic(t) + g F(tau) + a x^2 + b x^3,   x = max(tau - corner, 0),   tau = t + delay + rate (t - middle)
 
-with a cubic, a gain and a curvature after the corner of its own; delay and rate are common to all. This uses a small
-part of what a fit of the whole record would, and is unbiased where that is not.
+Each corner has its own cubic, gain and curvature after the corner; delay and rate are common to all. This uses only a
+small part of the record, but is unbiased where a fit of the whole record is not.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from smartshoe.arrays import Array
 
 SLOPE_OVER_S = 0.15
 APART_S = 0.3
-LEAST_JUMP = 0.03  # of the largest
+LEAST_JUMP = 0.03  # of the largest jump of the slope
 LONGEST_SIDE_S = 2.0
 SHORTEST_SIDE_S = 0.15
 SHARE_OF_GAP = 0.9
@@ -28,7 +28,7 @@ DEPENDENT = 1e-9
 
 
 def slope_of(time_s: Array, load: Array, over_s: float = SLOPE_OVER_S) -> Array:
-    """dF/dt (n,) by straight lines over ``over_s`` about each sample; evenly sampled."""
+    """Slope dF/dt (n,) of an evenly sampled load, from straight lines over ``over_s`` about each sample."""
     step = float(np.median(np.diff(time_s)))
     half = max(1, round(0.5 * over_s / step))
     place = np.arange(-half, half + 1) * step
@@ -38,7 +38,7 @@ def slope_of(time_s: Array, load: Array, over_s: float = SLOPE_OVER_S) -> Array:
 
 
 def corners(time_s: Array, load: Array) -> Array:
-    """The times (m,) at which the load's slope jumps, by more than noise and 3 % of the largest jump."""
+    """The times (m,) at which the load's slope jumps, by more than noise and more than 3 % of the largest jump."""
     step = float(np.median(np.diff(time_s)))
     slope = slope_of(time_s, load)
     half = max(1, round(0.5 * SLOPE_OVER_S / step))
@@ -58,7 +58,10 @@ def corners(time_s: Array, load: Array) -> Array:
 def follow_corners(
     machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
 ) -> tuple[float, float, float, float] | None:
-    """Delay in s, its sd, rate, its sd, from ``delay_s`` on; None where the load has no two corners."""
+    """Delay in s, its sd, clock rate, its sd, searched from ``delay_s`` on.
+
+    None where the load has fewer than two corners.
+    """
     at_corners = corners(machine_s, load)
     gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))
     sides = np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
@@ -79,7 +82,7 @@ def follow_corners(
             local = np.column_stack([place**k for k in range(4)] + [since**2, since**3, level / np.abs(level).max()])
             basis, triangle = np.linalg.qr(local)
             if np.abs(np.diag(triangle)).min() < DEPENDENT * np.abs(triangle).max():
-                continue  # the load is a cubic here: no corner that a reading could show
+                continue  # the load is a cubic here: it has no corner that the reading could show
             values = signal[first:last]
             gain = np.linalg.solve(triangle, basis.T @ values)[-1] / np.abs(level).max()
             tilt = gain * np.interp(tau, machine_s, slope)

@@ -1,4 +1,4 @@
-"""Devices by URL: ``SCHEME:TARGET?option=value``; the scheme names a provider found by entry point.
+"""Opens devices by URL, ``SCHEME:TARGET?option=value``; the scheme names a provider found by its entry point.
 
 A provider has ``open_machine(target, options, rng)``, ``open_shoe(target, options, rng)`` or both. It raises
 `UsageError` for a target that it does not know.
@@ -19,7 +19,10 @@ GROUP = "smartshoe.devices"
 
 
 def split_url(url: str) -> tuple[str, str, dict[str, str]]:
-    """``sim:instron?unit=left_toe`` as scheme, target and options; raises `UsageError` where there is no scheme."""
+    """Scheme, target and options of a URL such as ``sim:instron?unit=left_toe``.
+
+    Raises `UsageError` without a scheme.
+    """
     if not isinstance(url, str):
         raise UsageError(f"a device's address is of type {type(url).__name__}: give text like 'sim:instron'")
     scheme, colon, rest = url.partition(":")
@@ -31,8 +34,11 @@ def split_url(url: str) -> tuple[str, str, dict[str, str]]:
 
 @cache
 def _offered() -> dict[str, EntryPoint]:
-    """By scheme; looked for once, since reading what each installed package offers takes as long as a simulation."""
-    # From Python 3.12 on, entry points are taken by name and not by place, so that they cannot be reversed themselves.
+    """Entry points of all providers by scheme.
+
+    Cached, since scanning the installed packages takes as long as a simulation.
+    """
+    # From Python 3.12 on, entry points are indexed by name rather than position, so that they cannot be reversed.
     return {entry.name: entry for entry in reversed(tuple(entry_points(group=GROUP)))}
 
 

@@ -1,4 +1,4 @@
-"""Checks that any backend must pass; third parties run them on their own (`check_shoe`, `check_machine`)."""
+"""Checks that every backend must pass; third parties run them on their own (`check_shoe`, `check_machine`)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from smartshoe.protocol import Protocol, Segment
 
 
 class DeviceContractError(DeviceError):
-    """A backend breaks a promise of `smartshoe.devices._base`."""
+    """A backend violates the contract of `smartshoe.devices._base`."""
 
 
 def _require(holds: bool, device: Device, promise: str) -> None:
@@ -29,7 +29,7 @@ def _refuses(device: Device, kind: type[Exception], call: Callable[[], object], 
 
 
 def check_lifecycle(device: Device) -> None:
-    """Open once, close as often as you like, describe at any time."""
+    """Check that a device opens once, closes any number of times, and describes itself at any time."""
     _require(not device.is_open, device, "a new device is closed")
     device.close()
     with device:
@@ -47,7 +47,7 @@ def check_lifecycle(device: Device) -> None:
 
 
 def check_shoe(shoe: Shoe, blocks: int = 20) -> None:
-    """Lifecycle, then the first ``blocks`` blocks: shapes, names, finite readings, time that increases."""
+    """Check the lifecycle, then the first ``blocks`` blocks: shapes, names, finite readings, increasing time."""
     check_lifecycle(shoe)
     _refuses(shoe, DeviceError, lambda: next(shoe.blocks()), "reading a closed shoe raises DeviceError")
     with shoe:
@@ -69,7 +69,7 @@ def check_shoe(shoe: Shoe, blocks: int = 20) -> None:
 
 
 def check_machine(machine: TestMachine, protocol: Protocol) -> None:
-    """Lifecycle, refusal of a load beyond the limits, then ``protocol``: load and one sensor, time that increases."""
+    """Check the lifecycle, the refusal of a load beyond the limits, and the recording of ``protocol``."""
     check_lifecycle(machine)
     _refuses(machine, DeviceError, lambda: machine.run(protocol), "running a closed machine raises DeviceError")
     with machine:

@@ -1,12 +1,12 @@
-"""Delay and clock rate from a unit's reading alone: its own lag is estimated with them, so that it is not in them.
+"""Delay and clock rate from a unit's reading alone. The unit's own lag is fitted too, so that it does not bias them.
 
-The reading follows the load through a standard linear solid (Chinimilli 2016, eq. 2, read backwards): a share at once
-and a share through one first-order lag.
+The reading follows the load through a standard linear solid (Chinimilli 2016, eq. 2, read backwards): one share follows
+at once, another through a first-order lag.
 
     r(t) = offset + g0 F(tau) + g1 w(tau) + g2 exp(-p tau),   w' = p (F - w),   tau = t + delay + rate (t - middle)
 
-Seven numbers by Gauss-Newton: offset, g0, g1, g2 (what is left from before the log began), p, delay, rate. A lag of
-the sensor's own (a millisecond) stays in the delay.
+Seven parameters by Gauss-Newton: offset, g0, g1, g2 (relaxation still left from before the log began), p, delay, rate.
+A lag of the sensor itself (a millisecond) stays in the delay.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ SETTLED = 1e-2  # of a standard deviation
 STARTS_S = (3.0, 0.5)
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 FASTEST_S, SLOWEST_S = 0.05, 60.0
-LONGEST_WAY_S = 3.0  # from where load and reading correlate best: more than any unit's lag moves that
+LONGEST_WAY_S = 3.0  # from the best correlation of load and reading: more than any unit's lag shifts it
 LARGEST_RATE = 1e-2
 LARGEST_STEP = 1.0  # of log p in one iteration
 
 
 @dataclass(frozen=True, slots=True)
 class Following:
-    """Delay in s, rate, their standard deviations, the lag's time constant, the residual (n,) and its `misfit_of`."""
+    """Delay in s, clock rate, their sds, the lag's time constant, the residual (n,) and its `misfit_of`."""
 
     delay_s: float
     delay_sd_s: float
@@ -44,13 +44,13 @@ class Following:
 
 
 def misfit_of(residual: Array, sample_rate_hz: float) -> float:
-    """Variance of the residual's means over 0.5 s against that over 0.05 s, for as many samples: 1 where white."""
+    """Variance of the residual's means over 0.5 s relative to that over 0.05 s, per sample: 1 for white noise."""
     quick = _of_means(residual, QUICK_S * sample_rate_hz)
     return _of_means(residual, SLOW_S * sample_rate_hz) / quick if quick > 0.0 else 1.0
 
 
 def _of_means(residual: Array, samples: float) -> float:
-    """The variance of means over so many samples, times their number."""
+    """Variance of the residual's means over ``samples`` samples, multiplied by that number."""
     count = min(max(1, round(samples)), residual.size)
     means = residual[: residual.size // count * count].reshape(-1, count).mean(axis=1)
     return float(np.var(means)) * count
@@ -58,7 +58,7 @@ def _of_means(residual: Array, samples: float) -> float:
 
 @dataclass(frozen=True)
 class _Load:
-    """The load on an even grid."""
+    """The load interpolated to an even grid."""
 
     start_s: float
     step_s: float
@@ -69,7 +69,7 @@ class _Load:
         return np.asarray(self.start_s + self.step_s * np.arange(self.load.size), dtype=float)
 
     def lagged(self, pole: float) -> Array:
-        """w = p/(s + p) F, from rest at the first load."""
+        """The load (n,) behind a first-order lag, w = p/(s + p) F, starting at rest under the first load."""
         from smartshoe.kernels.pole_bank import lag_bank
 
         out = np.empty((self.load.size, 1))
@@ -87,7 +87,7 @@ def _even(machine_s: Array, load: Array) -> _Load:
 
 
 def _solved(design: Array, values: Array) -> tuple[Array, Array]:
-    """Least squares with columns of one size; the solution and the columns' sizes."""
+    """Least-squares solution with the columns scaled to equal size; returns it and the columns' original sizes."""
     size = np.abs(design).max(axis=0)
     size[size == 0.0] = 1.0
     return np.linalg.lstsq(design / size, values, rcond=None)[0] / size, size
@@ -108,7 +108,7 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
         tilt = np.interp(at, grid_s, slope_of(grid_s, linear[1] * even.load + linear[2] * lagged, TILT_OVER_S))
         small = 1e-3
         faster = linear[2] * (even.lagged(pole * (1.0 + small)) - lagged) / small
-        # The last three are of delay, rate and log p.
+        # The last three columns belong to delay, rate and log p.
         relaxing = np.interp(at, grid_s, faster) - linear[3] * pole * since * ends
         design = np.column_stack([shapes, tilt, tilt * (logger_s[inside] - middle), relaxing])
         change, size = _solved(design, values - shapes @ linear)
@@ -124,7 +124,7 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
             break
     rate_hz = 1.0 / float(np.median(np.diff(logger_s)))
     misfit = misfit_of(residual, rate_hz)
-    # Noise of an interpolated load is alike in neighbouring samples: what counts is its spread over half seconds.
+    # Noise of an interpolated load is correlated between neighbours: its spread over half seconds is what counts.
     sd *= np.sqrt(max(_of_means(residual, SLOW_S * rate_hz) / max(float(np.var(residual)), 1e-300), 1.0))
     return Following(delay, float(sd[4]), rate, float(sd[5]), 1.0 / pole, residual, misfit)
 
@@ -132,7 +132,7 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
 def follow(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> Following:
     """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) behind ``load`` (m,) at ``machine_s`` (m,).
 
-    From ``delay_s`` on; the better of the fits from `STARTS_S`.
+    The search begins at ``delay_s``; of the fits from the time constants `STARTS_S` the better one is returned.
     """
     even = _even(machine_s, load)
     found = [_one(even, logger_s, signal, delay_s, lag_s) for lag_s in STARTS_S]
@@ -140,10 +140,10 @@ def follow(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_
 
 
 def zeros_at(rests_s: Array, machine_s: Array, load: Array, at_s: Array, signal: Array) -> Array:
-    """The reading (k,) without load at the times ``rests_s`` (k,), two or more, freed of what relaxes there.
+    """The reading (k,) at zero load at the times ``rests_s`` (k,), freed of the unit's relaxation there.
 
-    Load (m,) at ``machine_s`` (m,) and ``signal`` (n,) at ``at_s`` (n,) on one clock. The zero runs straight from
-    rest to rest; the lag is the best of `LAGS_S`.
+    At least two times. Load (m,) at ``machine_s`` (m,) and ``signal`` (n,) at ``at_s`` (n,) are on one clock. The zero
+    changes linearly from rest to rest; the lag is the best fitting of `LAGS_S`.
     """
     even = _even(machine_s, load)
     hats = np.column_stack([np.interp(at_s, rests_s, one) for one in np.eye(rests_s.size)])

@@ -1,7 +1,7 @@
-"""Two logs of one experiment on one time base: the machine's load and the data logger's reading.
+"""Joins two logs of one experiment, the machine's load and the data logger's reading, on one time base.
 
-The two clocks are aligned by the loads themselves: the logger holds a copy of the load (a voltage, on a scale of its
-own) or, failing that, the reading that follows it.
+The two clocks are aligned by the loads themselves: the logger holds a copy of the load (a voltage, on its own scale)
+or, failing that, the reading that follows the load.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from smartshoe.recording import Channel, Recording, Role
 
 LEAST_CORRELATION = 0.8
 SAME_SIGNAL = 0.98
-COPY_CLOSER = 0.5  # a copy of the load is closer to it than the reading is; another sensor's channel is no closer
+COPY_CLOSER = 0.5  # a copy of the load fits it better than the reading does; another sensor's channel does not
 ITERATIONS = 8
 LARGEST_MISFIT = 1.5
 LONGEST_BRIDGED_STEPS = 3.5
-RARE_RATE = 0.01  # that a clock differs by from another: quartz by a ten-thousandth, a processor's own by a hundredth
+RARE_RATE = 0.01  # between two clocks: quartz clocks differ by a ten-thousandth, a processor's own by a hundredth
 Ticks = Literal["logger", "machine"]
 
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle); sd of both; correlation.
+    """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle), with both sd and the correlation.
 
-    ``residual`` is what the fit left of the signal, at the logger's samples that lie within the machine's log;
-    ``by_corners`` says that delay and rate come from the load's corners alone.
+    ``residual`` is the signal minus its fit, at the logger's samples that lie within the machine's log; ``by_corners``
+    tells whether delay and rate come from the load's corners alone.
     """
 
     delay_s: float
@@ -47,23 +47,23 @@ class Alignment:
 
     @property
     def says(self) -> str:
-        """How the machine's clock stands beside the logger's, in words: numbers below 0 are behind and slow."""
+        """The offset and rate of the machine's clock against the logger's, in words; negative is behind and slow."""
         return (
             f"{abs(self.delay_s):.4f} ± {self.delay_sd_s:.4f} s {'behind' if self.delay_s < 0 else 'ahead'},"
             f" {1e6 * abs(self.rate):.1f} ± {1e6 * self.rate_sd:.1f} ppm {'slow' if self.rate < 0 else 'fast'}"
         )
 
     def machine_time(self, logger_time_s: Array) -> Array:
-        """Logger time (n,) on the machine's clock."""
+        """Logger time (n,) converted to the machine's clock."""
         middle = 0.5 * (logger_time_s[0] + logger_time_s[-1])
         moved: Array = logger_time_s + self.delay_s + self.rate * (logger_time_s - middle)
         return moved
 
 
 def coarse(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> tuple[float, float]:
-    """Delay to within a step, by cross-correlation on a common grid, and the correlation where the two overlap there.
+    """Delay to within one step, by cross-correlation on a common grid, and the correlation over the overlap there.
 
-    One of them may cover a part of the other only.
+    One log may cover only part of the other.
     """
     from scipy.signal import correlate
 
@@ -123,11 +123,11 @@ def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alig
 
 @on_one_thread
 def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array) -> Alignment:
-    """Delay and clock rate between a load and a unit's reading that follows it, without the unit's own lag.
+    """Delay and clock rate between a load and the reading of a unit, excluding the unit's own lag.
 
-    By a fit of the unit's model with them; where that leaves more than noise, by the load's corners alone; where it
-    has none, as if the reading were a copy of the load. Raises
-    `InputError` where the two do not correlate.
+    The unit's model is fitted together with them. Where that leaves more than noise, only the load's corners are used;
+    where the load has no corners, the reading is treated as a copy of the load. Raises `InputError` where the two do
+    not correlate.
     """
     delay, correlation = coarse(machine_s, load, logger_s, reading)
     _require_match(correlation)
@@ -135,24 +135,24 @@ def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array
     if found.misfit <= LARGEST_MISFIT:
         return Alignment(found.delay_s, found.delay_sd_s, found.rate, found.rate_sd, correlation, found.residual)
     at_corners = follow_corners(machine_s, load, logger_s, reading, delay)
-    if at_corners is None:  # then the unit's lag cannot be distinguished from a delay, and stays in it
+    if at_corners is None:  # the unit's lag cannot be distinguished from a delay then, and stays part of it
         return align(machine_s, load, logger_s, reading)
     return Alignment(*at_corners, correlation, found.residual, True)
 
 
 def join(machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger") -> Recording:
-    """One recording of two logs, as `join_with_clocks` makes it."""
+    """One recording of the two logs; like `join_with_clocks`, without the alignment."""
     return join_with_clocks(machine_log, logger_log, ticks=ticks)[0]
 
 
 def join_with_clocks(
     machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger"
 ) -> tuple[Recording, Alignment]:
-    """One recording on the logger's clock, at the ``ticks`` of the one and with the channels of the other moved to it.
+    """One recording on the logger's clock, at the sample times of the log ``ticks``, the other's channels interpolated.
 
-    Beside it how the two clocks lie; the recording's metadata has it too, for its file. The slower one's ticks keep
-    noise white: a signal that is read more often than it was sampled repeats its noise. Raises `InputError` where the
-    logs do not belong together.
+    Also returns the alignment of the two clocks, which the recording's metadata repeats for its file. The sample times
+    of the slower log keep noise white: interpolating a signal to a higher rate repeats its noise. Raises `InputError`
+    where the logs do not belong together.
     """
     load = machine_log.load
     candidates = [c for c in logger_log.channels.values() if c.role != "sensor"]
@@ -212,7 +212,7 @@ def join_with_clocks(
 
 
 def _moved(channel: Channel, own_s: Array, to_s: Array) -> Channel:
-    """The channel, sampled at ``own_s`` (n,), at the times ``to_s`` (m,), missing where it has a hole."""
+    """The channel, sampled at ``own_s`` (n,), interpolated to the times ``to_s`` (m,); missing where it has a gap."""
     values = np.interp(to_s, own_s, channel.values)
     after = np.clip(np.searchsorted(own_s, to_s), 1, own_s.size - 1)
     step = own_s[after] - own_s[after - 1]
@@ -229,9 +229,9 @@ def _as_metadata(found: Alignment) -> dict[str, str]:
 
 
 def join_pairs(recordings: Sequence[Recording]) -> list[Recording]:
-    """Experiments from logs: one that has a load and no reading is joined with its neighbour that has the reading.
+    """Experiments from logs: a log with a load but no reading is joined with the neighbour that has the reading.
 
-    A recording with both stands for itself.
+    A recording with both is returned as it is.
     """
     found: list[Recording] = []
     waiting: Recording | None = None

@@ -1,4 +1,4 @@
-"""`LoggedMachine`: a test that a machine has run already, through the same calls as a machine that runs."""
+"""`LoggedMachine`: a finished test, read from its log files through the same calls as a machine that runs."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ PEAK_TOLERANCE = 0.05
 
 
 class LoggedMachine(TestMachine):
-    """A machine's log (Bluehill or any readable file) and, where the reading is in it, a data logger's.
+    """A machine's log (Bluehill or any readable file) and, for a reading in its own file, the data logger's.
 
-    ``run`` refuses a protocol whose peak load is not the logged one: a log cannot be run differently.
+    ``run`` refuses a protocol whose peak load differs from the logged one: a log cannot be run differently.
     """
 
     def __init__(self, machine_log: Path, logger_log: Path | None = None, **columns: Any) -> None:
@@ -38,12 +38,12 @@ class LoggedMachine(TestMachine):
 
     @property
     def limits(self) -> MachineLimits:
-        """The Instron 5944's."""
+        """The limits of the Instron 5944."""
         return INSTRON_5944
 
     @property
     def recording(self) -> Recording:
-        """The experiment as it was logged, on one time base; raises `InputError` where the logs do not fit."""
+        """The logged experiment on one time base; raises `InputError` where the logs do not belong together."""
         if self._recording is None:
             machine, logger = self._paths
             if logger is None:
@@ -59,7 +59,7 @@ class LoggedMachine(TestMachine):
 
     @property
     def logs(self) -> tuple[Recording, ...]:
-        """The files as they were read."""
+        """The recordings of the files, before they were joined."""
         _ = self.recording
         return self._logs
 
@@ -67,7 +67,7 @@ class LoggedMachine(TestMachine):
         _ = self.recording
 
     def describe(self) -> tuple[ChannelDescription, ...]:
-        """The logged channels; ranges are those that the values reached."""
+        """The logged channels; a channel's range is that of its logged values."""
         rate = self.recording.sample_rate_hz
         return tuple(
             ChannelDescription(
@@ -87,12 +87,12 @@ class LoggedMachine(TestMachine):
 
 
 class _LogProvider:
-    """``log:FILE?daq=FILE&time=...&force=...&sensor=...``."""
+    """Provider of ``log:FILE?daq=FILE&time=...&force=...&sensor=...``."""
 
     def open_machine(
         self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
     ) -> LoggedMachine:
-        """The log at ``target``; ``rng`` is not used, a log is what it is."""
+        """The log at ``target``; ``rng`` is not used, since nothing is random."""
         given = dict(options or {})
         logger = given.pop("daq", None)
         columns: dict[str, Any] = {key: given.pop(key) for key in ("time", "force", "unit") if key in given}

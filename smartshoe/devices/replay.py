@@ -1,4 +1,4 @@
-"""Recordings played back through the same calls as live devices, with their own time stamps."""
+"""Plays recordings back through the same calls as live devices, with the recorded time stamps."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from smartshoe.recording import SENSOR_NAME, UNITS_OF_A_SHOE, Channel, Recording
 
 
 class ReplayedShoe(Shoe):
-    """A shoe's recording as a stream of blocks; nothing sleeps.
+    """A shoe's recording played back as a stream of blocks, without waiting between them.
 
-    The unit under test of a recording that names its place goes by that, as it does in a shoe and in its calibration.
+    If the recording names the place of the unit under test, that channel is named by it, as in a shoe and in the unit's
+    calibration.
     """
 
     def __init__(self, recording: Recording, block_samples: int = 20) -> None:
@@ -39,11 +40,11 @@ class ReplayedShoe(Shoe):
 
     @property
     def sample_rate_hz(self) -> float:
-        """One over the recording's median step."""
+        """The reciprocal of the recording's median sampling step."""
         return self.recording.sample_rate_hz
 
     def describe(self) -> tuple[ChannelDescription, ...]:
-        """The recording's sensors."""
+        """The recording's sensor channels."""
         return tuple(
             ChannelDescription(self._name_of(c), c.unit.quantity, c.unit, c.range_, c.resolution, self.sample_rate_hz)
             for c in self.recording.sensors
@@ -64,7 +65,7 @@ class ReplayedShoe(Shoe):
 
 
 class _ReplayProvider:
-    """``replay:FILE?block_samples=20&time=...``."""
+    """Provider of ``replay:FILE?block_samples=20&time=...``."""
 
     def open_shoe(
         self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None

@@ -1,1 +1,1 @@
-"""Files of every format, read behind one gate and written whole."""
+"""Reads files of every format with common safety checks, and writes files atomically."""

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all, and JSON without NaN."""
+"""Writes files atomically (completely or not at all), and JSON without NaN."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from typing import Any
 
 from smartshoe.errors import SmartShoeError, UsageError
 
-_LONGEST_STEM, _LONGEST_ENDING = 40, 12  # of the temporary file's name, in letters: a name has 255 bytes
-_MOST_LINKS = 40  # as Linux
-# By any of these names the process's own open files: what stands behind them is another's to replace.
+_LONGEST_STEM, _LONGEST_ENDING = 40, 12  # characters of the temporary file's name, which may have 255 bytes
+_MOST_LINKS = 40  # as in Linux
+# Names of the process's own open files, which are not ours to replace.
 _STREAMS = {"/dev/stdout": 1, "/dev/stderr": 2}
 _DESCRIPTOR = re.compile(r"/dev/std(out|err)|(/dev|/proc/(self|thread-self))/fd/(?P<number>\d{1,6})")
 
 
 @contextmanager
 def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
-    """Yield a temporary path; when the block ends without an error its file takes the place of ``path``.
+    """Yield a temporary path; when the block ends without an error, its file replaces ``path``.
 
-    The content is on disk before the name is: an error, a kill or a pulled plug leaves ``path`` as it was, or whole.
-    Without ``durable`` nothing waits for the disk: a kill still does no harm, a pulled plug may leave an empty file.
-    A symbolic link to a file stays, and the file that it leads to is replaced. A device or a pipe (``/dev/null``,
-    ``/dev/stdout``) is never replaced: the content is written to it when it is whole. Raises `UsageError` where
-    nothing can be written, a full disk within the block included.
+    The content is on disk before the name is: an error, a kill or a power failure leaves ``path`` either unchanged or
+    complete. Without ``durable`` nothing waits for the disk: a kill still does no harm, but a power failure may leave
+    an empty file. A symbolic link to a file is kept, and the file it points to is replaced. A device or a pipe
+    (``/dev/null``, ``/dev/stdout``) is never replaced: the complete content is written to it. Raises `UsageError` where
+    nothing can be written, including a full disk within the block.
     """
     try:
         target, streamed = _place(Path(path))
         named = target if isinstance(target, Path) else Path(path)
         folder = Path(tempfile.gettempdir()) if streamed else named.parent
-        # The ending stays: some writers tell the format by it.
+        # The suffix is kept, as some writers choose the format by it.
         handle, name = tempfile.mkstemp(
             dir=folder, prefix=f".{named.stem[:_LONGEST_STEM]}.", suffix=f".partial{named.suffix[:_LONGEST_ENDING]}"
         )
@@ -49,7 +49,7 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
     temporary = Path(name)
     try:
         if not streamed:
-            # mkstemp makes files private; a result file follows the user's umask like any other.
+            # mkstemp creates private files; a result file follows the user's umask like any other.
             umask = os.umask(0)
             os.umask(umask)
             temporary.chmod(0o666 & ~umask)
@@ -65,12 +65,12 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
     except SmartShoeError:
         raise
     except BrokenPipeError:
-        raise  # the reader of our output went away: no fault
+        raise  # the reader of our output closed it, which is no error of ours
     except OSError as error:
         raise _unwritable(path, error) from error
     finally:
         with suppress(OSError):
-            temporary.unlink()  # it is not there where it has taken its place
+            temporary.unlink()  # it no longer exists once it has replaced its target
 
 
 def _unwritable(path: Path | str, error: Exception) -> UsageError:
@@ -87,7 +87,10 @@ def _unwritable(path: Path | str, error: Exception) -> UsageError:
 
 
 def _place(path: Path) -> tuple[Path | int, bool]:
-    """Where content for ``path`` goes: a path, links followed, or an open descriptor; and whether it is streamed."""
+    """Where content for ``path`` goes, and whether it is streamed there.
+
+    The place is a path with links resolved, or an open descriptor.
+    """
     for _ in range(_MOST_LINKS):
         descriptor = _DESCRIPTOR.fullmatch(os.path.normpath(Path.cwd() / path))
         if descriptor:
@@ -112,7 +115,7 @@ def _place(path: Path) -> tuple[Path | int, bool]:
 
 
 def _refuse_strangers_link(path: Path) -> None:
-    """In a folder that everybody may write to, a link that somebody else laid is not followed."""
+    """Refuse a link that another user created in a world-writable folder."""
     if not hasattr(os, "geteuid"):
         return
     owner, folder = path.lstat().st_uid, path.parent.stat()
@@ -121,7 +124,10 @@ def _refuse_strangers_link(path: Path) -> None:
 
 
 def _write_through(content: Path, target: Path | int) -> None:
-    """The whole ``content`` into a device, pipe or descriptor; `OSError` (ENXIO) where nobody reads the pipe."""
+    """Write all of ``content`` to a device, pipe or descriptor.
+
+    Raises `OSError` (ENXIO) where nobody reads the pipe.
+    """
     if isinstance(target, int):
         sys.stdout.flush()
         handle = os.dup(target)
@@ -141,30 +147,30 @@ def _to_disk(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """A new file's name is on disk only once its folder is."""
-    if os.name == "nt":  # a folder cannot be opened there
+    """Sync a folder to disk, since a new file's name is on disk only once its folder is."""
+    if os.name == "nt":  # Windows cannot open a folder
         return
     try:
         handle = os.open(folder, os.O_RDONLY)
-    except PermissionError:  # one that may be written to and not listed
+    except PermissionError:  # the folder may be written to, but not listed
         return
     try:
         os.fsync(handle)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some network file systems have no such call
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some network file systems lack this call
             raise
     finally:
         os.close(handle)
 
 
 def write_text(path: Path | str, text: str, durable: bool = True) -> None:
-    """Write ``text`` as UTF-8 to ``path``, whole or not at all, as `replacing` does."""
+    """Write ``text`` as UTF-8 to ``path``, atomically as `replacing` does."""
     with replacing(path, durable) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def json_text(result: Mapping[str, Any]) -> str:
-    """The result as JSON text; NaN and infinity are an error, never written."""
+    """The result as JSON text; NaN and infinity raise an error."""
     import json
 
     return json.dumps(result, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
@@ -172,21 +178,21 @@ def json_text(result: Mapping[str, Any]) -> str:
 
 @contextmanager
 def results_folder(path: Path | str) -> Iterator[Path]:
-    """Yield `make_folder` of ``path``; where the block ends with an error, folders it made and left empty are gone."""
+    """Yield `make_folder` of ``path``; if the block fails, folders that it created and left empty are removed."""
     made = [place for place in (Path(path), *Path(path).parents) if not place.exists()]
     try:
         yield make_folder(path)
     except BaseException:
         for place in made:
-            with suppress(OSError):  # what holds something stays
+            with suppress(OSError):  # a folder that is not empty is kept
                 place.rmdir()
         raise
 
 
 def make_folder(path: Path | str) -> Path:
-    """Create the folder ``path`` (and parents) where it is missing, checking that it can be written to.
+    """Create the folder ``path`` (and parents) where it is missing, and check that it can be written to.
 
-    The names of new folders are on disk when this returns: a file in a folder that is lost is lost with it.
+    The names of new folders are on disk when this returns, since losing a folder means losing the files in it.
     """
     folder = Path(path)
     try:

@@ -1,4 +1,4 @@
-"""What comes with smartshoe beside its code: in a checkout its folders, in a wheel among the environment's data."""
+"""Finds files shipped with smartshoe besides its code: in a checkout's folders, or in a wheel's shared data."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def shipped(name: str) -> Path | None:
-    """The file or folder ``name`` ("docs", "scenarios/calibration.toml") as it was shipped, None where it is not."""
+    """The path of the shipped file or folder ``name`` ("docs", "scenarios/calibration.toml"), or None."""
     schemes = (sysconfig.get_default_scheme(), sysconfig.get_preferred_scheme("user"))
     installed = (Path(sysconfig.get_path("data", scheme)) / "share" / "smartshoe" for scheme in schemes)
-    checkout = Path(__file__).resolve().parents[2]  # of a wheel this is where other packages are too
+    checkout = Path(__file__).resolve().parents[2]  # for a wheel, the folder of all installed packages
     homes = (*([checkout] if (checkout / "pyproject.toml").is_file() else []), *installed)
     return next((home / name for home in homes if (home / name).exists()), None)

@@ -1,4 +1,4 @@
-"""Identification of a unit's model from experiments, with uncertainty and residual tests."""
+"""Identifies a unit's model from experiments, with uncertainty and residual tests."""
 
 from smartshoe.identification._bank import CoefficientFits, fit_coefficients
 from smartshoe.identification._consistency import ConsistencyTest, consistency_test

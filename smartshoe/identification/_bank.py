@@ -1,4 +1,4 @@
-"""Many fits of the three coefficients: Monte-Carlo studies, bootstraps, whole fleets of units."""
+"""Fits the three coefficients of many experiments at once: Monte-Carlo studies, bootstraps, fleets of units."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ COARSEST_STEP_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class CoefficientFits:
-    """A row for each of m fits.
+    """Results of m fits, one row each.
 
-    ``coefficients`` (m, 3) a1, b0, b1, ``covariance`` (m, 3, 3), ``rmse`` (m,), ``passes`` (m,) over the data, and
-    whether it ``converged`` (m,); NaN where SRIVC found no start.
+    ``coefficients`` (m, 3) a1, b0, b1, their ``covariance`` (m, 3, 3), ``rmse`` (m,), the number of ``passes`` (m,)
+    over the data, and whether the fit ``converged`` (m,); NaN where SRIVC found no start.
     """
 
     coefficients: Array
@@ -31,7 +31,7 @@ class CoefficientFits:
 
     @property
     def sd(self) -> Array:
-        """(m, 3) standard deviations."""
+        """(m, 3) standard deviations of the coefficients."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
 
@@ -40,11 +40,12 @@ def fit_coefficients(
 ) -> CoefficientFits:
     """a1, b0, b1 of output = (b0 s + b1)/(s + a1) input, Chinimilli 2016 (13), of many experiments of one length.
 
-    ``inputs`` and ``outputs`` (m, n) or (n,), one of them shared where it has one row. Nothing else is estimated: no
-    offset, no delay, steady before the first sample; `identify` does that. Gauss-Newton from SRIVC, compiled;
-    ``workers`` threads (-1: one a core). Raises `InputError` for samples that are missing or shapes that differ.
+    ``inputs`` and ``outputs`` are (m, n) or (n,); one of them may have a single row shared by all. Nothing else is
+    estimated: no offset, no delay, and the steady state before the first sample is assumed (`identify` does more).
+    Gauss-Newton from SRIVC, compiled, on ``workers`` threads (-1: one per core). Raises `InputError` for missing
+    samples or shapes that do not match.
     """
-    # A recording's signals cannot be written to: for those numba would compile every pass of the fit anew.
+    # A recording's signals are read-only arrays, for which numba would compile every pass of the fit again.
     u, y = (np.atleast_2d(np.require(values, float, ["C", "W"])) for values in (inputs, outputs))
     if not (np.isfinite(sample_time_s) and sample_time_s > 0 and np.isfinite(prefilter_rad_s) and prefilter_rad_s > 0):
         raise UsageError(

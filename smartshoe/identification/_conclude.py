@@ -1,4 +1,4 @@
-"""From a fit to an `Identification`: parameters with intervals, nuisances with error bars, refusals with reasons."""
+"""Turns a fit into an `Identification`: parameters with intervals, nuisance parameters with error bars, refusals."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from smartshoe.recording import sample_rate_of
 from smartshoe.signals.loading import rate_range
 from smartshoe.units import Unit
 
-WORST_RELATIVE_SD = 1.0  # of the pole; beyond it the interval holds every relaxation time
+WORST_RELATIVE_SD = 1.0  # of the pole; beyond it the interval includes every relaxation time
 WORST_RELATIVE_GAIN_SD = 0.2
 NAMES = ("a1", "b0", "b1", "k1", "k2", "c")
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What the caller asked for, as far as the result tells of it. ``newtons`` N per reading unit, None: estimated."""
+    """The caller's options that the result reports. ``newtons`` is N per reading unit, None where it is estimated."""
 
     unit: str
     method: str
@@ -38,7 +38,7 @@ class Choice:
 
 
 def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
-    """Parameters with covariance (delta method, or likelihood profile) at the fit's theta."""
+    """The `Identification` of a fit, with covariances by the delta method or intervals by likelihood profile."""
     problem, theta = fit.problem, fit.theta
     settings, experiments = problem.settings, problem.experiments
     if fit.degrees < 1:
@@ -87,7 +87,7 @@ def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
             "the reading falls as the load rises: a1, b0 and b1 hold as they are, k1 and k2 are springs only where the"
             " reading or the load is turned"
         )
-    if values[4] * values[2] * scale < 0:  # of a reading that falls with the load the spring and the gain are negative
+    if values[4] * values[2] * scale < 0:  # spring and gain are both negative for a reading that falls with the load
         which = "negative" if values[4] < 0 else "positive beside a negative gain"
         notes.append(f"k2 is {which}: the reading leads the load, which no standard linear solid does")
     used = [experiment for experiment in experiments if experiment.mask.any()]
@@ -152,7 +152,10 @@ def _function(fit: ParameterFit, choice: Choice, index: int) -> Function:
 
 
 def solid_of(coefficients: Array, newtons: float | None) -> tuple[Array, Array, float]:
-    """(k1, k2, c), their Jacobian (3, 3) over (a1, b0, b1), and the scale; newtons None: c = 1 and scale free."""
+    """(k1, k2, c), their Jacobian (3, 3) over (a1, b0, b1), and the scale.
+
+    Where ``newtons`` (N per reading unit) is None, c is 1 and the scale is free.
+    """
     a1, b0, b1 = (float(value) for value in coefficients)
     static = b1 / a1
     static_slope = np.array([-static / a1, 0.0, 1 / a1])
@@ -176,16 +179,16 @@ def solid_of(coefficients: Array, newtons: float | None) -> tuple[Array, Array, 
 def _offsets(
     fit: ParameterFit, choice: Choice, static: float, slope: Array, quantile: float
 ) -> tuple[dict[str, Parameter], dict[str, Parameter]]:
-    """Per recording the reading at no load and the load cell's zero.
+    """For each recording, the reading at no load and the load cell's zero.
 
-    The one free constant stands for either: in the inverse direction it is the load's, and minus the static gain
-    times the reading's; in the forward direction the reading's, and minus the load's over the static gain.
+    The single free constant represents both. In the inverse direction it is the load's zero, and minus the static gain
+    times the reading's; in the forward direction it is the reading's, and minus the load's over the static gain.
     """
     problem, settings = fit.problem, fit.problem.settings
     inverse = settings.direction == "inverse"
     reading_fixed = Parameter.from_sd(settings.offset or 0.0, 0.0, choice.reading_unit.symbol)
     load_fixed = Parameter.from_sd(settings.load_offset_n, 0.0, "N")
-    # The static gain b1/a1 as a function of theta, for the constant that has passed it.
+    # The static gain b1/a1 as a function of theta, to convert the constant through it.
     a1 = float(problem.coefficients(fit.theta)[0][0])
     gain_slope = (slope[2] - static * slope[0]) / a1
     readings, loads = {}, {}
@@ -211,7 +214,7 @@ def _offsets(
 
 
 def _spread_of_output(fit: ParameterFit) -> float:
-    """Sum of squares of the output about its mean, over all samples that count."""
+    """Sum of squares of the output about its mean, over all counted samples."""
     outputs = [masked(y, mask) for y, mask in zip(fit.problem.outputs, fit.problem.masks, strict=True)]
     count = sum(output.size for output in outputs)
     mean = sum(float(output.sum()) for output in outputs) / count
@@ -225,9 +228,9 @@ def _plain_cost(fit: ParameterFit) -> float:
 
 
 def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array, left: float) -> None:
-    """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself, a fit that does nothing.
+    """Raise `NotIdentifiableError` where gain or pole are as uncertain as they are large, or the fit explains nothing.
 
-    ``left``: of the output's variance the model's error, from 1 on no better than a mean, whatever the fit minimised.
+    ``left``: the model's squared error over the output's variance; from 1 on the fit is no better than a constant.
     """
     gain_sd = float(np.sqrt(max(fit.covariance[fit.problem.shape_size - 1, fit.problem.shape_size - 1], 0.0)))
     loose = gain_sd > WORST_RELATIVE_GAIN_SD * abs(fit.theta[fit.problem.shape_size - 1])

@@ -1,4 +1,4 @@
-"""Whether the paper's two-parameter form (c = 1) agrees with three free coefficients."""
+"""Tests whether the paper's two-parameter form (c = 1) agrees with three free coefficients."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from smartshoe.models.parameter import finite_or_none
 
 @dataclass(frozen=True, slots=True)
 class ConsistencyTest:
-    """A chi-square ``statistic`` of one degree of freedom: by how much the gains and the pole ask for another c.
+    """A chi-square ``statistic`` of one degree of freedom: how strongly the gains and the pole contradict the given c.
 
     ``k2_from_gains`` = (b0 - b1/a1)/(scale X) and ``k2_from_pole`` = a1 c are equal where the form holds.
     """
@@ -27,12 +27,12 @@ class ConsistencyTest:
 
     @property
     def consistent(self) -> bool:
-        """Whether the form is not rejected at 1 %."""
+        """Whether the form is not rejected at the 1 % level."""
         return self.p_value >= 0.01
 
     @property
     def says(self) -> str:
-        """The finding in one sentence."""
+        """The result as one sentence."""
         verdict = "agree" if self.consistent else "do not agree"
         return (
             f"k2 from the gains ({self.k2_from_gains:.4g}) and from the pole ({self.k2_from_pole:.4g}) {verdict}"
@@ -40,7 +40,7 @@ class ConsistencyTest:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON."""
+        """The test as plain numbers for JSON."""
         return {
             "statistic": finite_or_none(self.statistic),
             "p_value": finite_or_none(self.p_value),

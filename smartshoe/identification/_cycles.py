@@ -1,4 +1,4 @@
-"""Repeated load cycles: found, aligned on the load, averaged; the instruments that follow from them."""
+"""Repeated load cycles: finds them, aligns them on the load and averages them; also derives instruments from them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.recording import Recording
 from smartshoe.signals import loading
 
-SAME_RATE = 0.10  # also of the time from mid-rise to mid-fall, which a hold would change
+SAME_RATE = 0.10  # also for the time from mid-rise to mid-fall, which a hold would change
 SAME_PEAK = 0.05
 NEAR_REST = 0.05  # of the load's range
 
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """One cycle of ``recording`` (its index): samples ``start:stop``, up to the next cycle, rest included.
+    """One cycle of ``recording`` (its index): samples ``start:stop``, up to the next cycle, including the rest.
 
-    ``rise`` and ``fall`` are the straight lines (slope in N/s, intercept in N) through 10 % to 90 % of its ramps,
-    over time from the recording's first sample.
+    ``rise`` and ``fall`` are straight lines (slope in N/s, intercept in N) through 10 % to 90 % of the ramps, over time
+    from the recording's first sample.
     """
 
     recording: int
@@ -38,13 +38,16 @@ class Repeat:
         return 0.5 * (self.rise[0] - self.fall[0])
 
     def crossings_s(self, level_n: float) -> tuple[float, float]:
-        """When the two lines pass a level: a place between samples, to which all of a ramp's samples contribute."""
+        """Times in s at which the two lines cross a level.
+
+        More exact than single samples, since the whole ramp contributes.
+        """
         (up, at_up), (down, at_down) = self.rise, self.fall
         return (level_n - at_up) / up, (level_n - at_down) / down
 
     @property
     def duration_s(self) -> float:
-        """From mid-rise to mid-fall."""
+        """Time in s from mid-rise to mid-fall."""
         rise_s, fall_s = self.crossings_s(0.5 * (self.base_n + self.peak_n))
         return fall_s - rise_s
 
@@ -54,7 +57,7 @@ class CycleGroup:
     """Repeats of one kind of cycle: rate within 10 %, peak within 5 %, mid-rise to mid-fall within 10 %.
 
     A sample's place in the cycle is in seconds of the mean cycle: 0 at mid-rise, ``duration_s`` at mid-fall.
-    ``first_s`` to ``last_s`` are the places that every repeat covers, from the ramp's foot into the rest.
+    ``first_s`` to ``last_s`` are the places covered by every repeat, from the foot of the ramp into the rest.
     """
 
     rate_n_per_s: float
@@ -66,20 +69,20 @@ class CycleGroup:
     repeats: tuple[Repeat, ...]
 
     def places_s(self, repeat: Repeat, recordings: Sequence[Recording]) -> Array:
-        """(stop - start,) places of the repeat's own samples; they may lie outside ``first_s`` to ``last_s``."""
+        """(stop - start,) places of the repeat's own samples in s; they may lie outside ``first_s`` to ``last_s``."""
         return _places(repeat, recordings, self.level_n, self.duration_s)
 
     def covers(self, places_s: Array) -> Mask:
-        """Which places every repeat has."""
+        """Mask of the places that every repeat covers."""
         inside: Mask = (places_s >= self.first_s) & (places_s <= self.last_s)
         return inside
 
 
 def repeated_cycles(recordings: Sequence[Recording], *, skip_first: int = 0) -> list[CycleGroup]:
-    """The kinds of load cycle that occur twice at least, by rate; rests between cycles may vary.
+    """The kinds of load cycle that occur at least twice, by rate; rests between cycles may vary.
 
-    ``skip_first`` cycles of each recording are left out, where a unit softens. Raises `MissingChannelError` for a
-    recording without load.
+    The first ``skip_first`` cycles of each recording are left out, as a unit may soften during them. Raises
+    `MissingChannelError` for a recording without load.
     """
     found = [repeat for index in range(len(recordings)) for repeat in _repeats(recordings, index)[skip_first:]]
     kinds: list[list[Repeat]] = []
@@ -95,12 +98,12 @@ def repeated_cycles(recordings: Sequence[Recording], *, skip_first: int = 0) -> 
 
 
 def averaged_reading(recordings: Sequence[Recording]) -> list[Array]:
-    """Per recording (n,): the mean of the *other* repeats' readings at each sample's place, NaN outside of repeats.
+    """For each recording (n,): the mean of the *other* repeats' readings at each sample's place; NaN outside repeats.
 
-    In the first recording's reading unit; each recording's own reading at rest is put in the place of the others'.
-    Its noise is independent of the sample's own: an instrument for the inverse direction. Not of its neighbours' in
-    the other repeats: a model that remembers the cycle before keeps some bias. Raises `MissingChannelError` without
-    load or reading, `UnitError` for readings of different quantities.
+    In the first recording's reading unit; the recording's own reading at rest replaces that of the others. Its noise is
+    independent of the sample's own, so it is an instrument for the inverse direction. It is not independent of
+    neighbouring samples in the other repeats: a model that remembers the previous cycle keeps some bias. Raises
+    `MissingChannelError` without load or reading, `UnitError` for readings of different quantities.
     """
     unit = recordings[0].sensor.unit
     signals, rests = [], []
@@ -109,7 +112,7 @@ def averaged_reading(recordings: Sequence[Recording]) -> list[Array]:
         reading = np.where(sensor.present, sensor.in_unit(unit), np.nan)
         load_n = recording.force_n
         resting = (load_n <= load_n.min() + NEAR_REST * np.ptp(load_n)) & np.isfinite(reading)
-        # One constant for a recording cannot carry a sample's own noise into its instrument by more than 1/n.
+        # One constant per recording transfers at most 1/n of a sample's own noise into its instrument.
         rests.append(float(np.median(reading[resting])) if resting.any() else 0.0)
         signals.append(reading - rests[-1])
     averaged = [np.full(len(recording), np.nan) for recording in recordings]
@@ -126,7 +129,7 @@ def averaged_reading(recordings: Sequence[Recording]) -> list[Array]:
 
 
 def _repeats(recordings: Sequence[Recording], index: int) -> list[Repeat]:
-    """The cycles of one recording, each up to the foot of the next."""
+    """The cycles of one recording, each up to the foot of the next ramp."""
     recording = recordings[index]
     time_s, load_n = recording.time_s - recording.time_s[0], recording.force_n
     found = loading.cycles(time_s, load_n)
@@ -171,7 +174,7 @@ def _group(kind: Sequence[Repeat], recordings: Sequence[Recording]) -> CycleGrou
     crossings = [one.crossings_s(level_n) for one in kind]
     duration_s = float(np.mean([fall_s - rise_s for rise_s, fall_s in crossings]))
     places = [_places(one, recordings, level_n, duration_s) for one in kind]
-    # A long rest after the cycle says nothing more: of it as much as the cycle lasts, at most.
+    # A long rest after the cycle adds no information: keep at most as much of it as the cycle lasts.
     return CycleGroup(
         rate_n_per_s=float(np.mean([one.rate_n_per_s for one in kind])),
         peak_n=float(np.mean([one.peak_n for one in kind])),
@@ -194,7 +197,7 @@ def _places(repeat: Repeat, recordings: Sequence[Recording], level_n: float, dur
 def _at(
     group: CycleGroup, repeat: Repeat, recordings: Sequence[Recording], signals: Sequence[Array], places_s: Array
 ) -> Array:
-    """A repeat's signal at places of the cycle, NaN beside a missing sample."""
+    """A repeat's signal at given places of the cycle; NaN next to a missing sample."""
     own_s = group.places_s(repeat, recordings)
     return np.interp(places_s, own_s, signals[repeat.recording][repeat.start : repeat.stop])
 

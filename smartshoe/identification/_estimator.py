@@ -1,4 +1,4 @@
-"""Which noise the fit allows for, and the fit itself."""
+"""Chooses which noise the fit allows for, and runs the fit."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from smartshoe.identification._uncertainty import inverse_normal
 from smartshoe.recording import Recording
 
 Estimator = Literal["auto", "output_error", "errors_in_variables", "command", "cycles"]
-RATIO_ROUNDS = 4  # of fit and variance; the ratio enters weakly
+RATIO_ROUNDS = 4  # alternations of fit and variance; the ratio has little influence
 MOST_RATIO = 1e8
-WEAK = 4.0  # standard errors by instruments over those of the plain fit
+WEAK = 4.0  # instruments are weak where their standard errors exceed those of the plain fit by this factor
 
 
 @dataclass(frozen=True)
 class Termination:
-    """When a fit ends: at a relative change of theta, or after so many iterations."""
+    """When a fit ends: at a relative change of theta, or after a number of iterations."""
 
     tolerance: float
     max_iterations: int
@@ -37,7 +37,7 @@ class Termination:
 
 @dataclass(frozen=True, eq=False)
 class ParameterFit:
-    """theta of ``problem`` with its covariance, and how it was found."""
+    """The solution theta of ``problem`` with its covariance, and how it was found."""
 
     problem: PredictionError
     theta: Array
@@ -65,7 +65,7 @@ def estimate(
     tolerance: float,
     max_iterations: int,
 ) -> ParameterFit:
-    """The fit by the ``estimator`` asked for, or by the one that the data ask for.
+    """The fit by the requested ``estimator``; for "auto", by the one that the data call for.
 
     ``noise`` holds the standard deviations of load (N) and reading, None where they are to be estimated.
     """
@@ -112,7 +112,7 @@ def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float,
     if method != "srivc" or problem.delay_at is not None:
         found = _minimise(problem, theta, solver, limits)
         iterations, converged = found.iterations, found.converged
-        # A delay of many samples reaches beyond the edges that were left out at first.
+        # A delay of many samples reaches beyond the edges left out initially.
         shortest_s = min(experiment.sample_time_s for experiment in problem.experiments)
         edge = int(np.ceil(abs(problem.delay_s(found.theta)) / shortest_s)) + EDGE_SAMPLES
         if problem.delay_at is not None and edge > EDGE_SAMPLES + 1:
@@ -121,7 +121,7 @@ def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float,
             iterations, converged = iterations + found.iterations, found.converged
         theta, seen = found.theta, found.evaluation
     if method == "srivc":
-        # SRIVC has no delay of its own: it is found by prediction error, then SRIVC runs on the aligned signals.
+        # SRIVC does not estimate a delay: it is found by prediction error, then SRIVC runs on the aligned signals.
         delay_s = problem.delay_s(theta)
         alpha, p1, p2, _, iterations, converged = srivc(
             problem,
@@ -154,7 +154,7 @@ def _settle(
 
 
 def _concern(fit: ParameterFit, input_sd: float) -> str:
-    """What the input's noise does to the fit, in one clause; '' where it does not matter."""
+    """How the input's noise affects the fit, as one clause; '' where it does not matter."""
     if input_sd == 0.0 or fit.degrees < 1 or fit.degenerate or fit.evaluation is None:
         return ""
     problem = fit.problem
@@ -182,10 +182,10 @@ def _has_command(problem: PredictionError) -> bool:
 
 
 def _with_better_start(fit: ParameterFit, prefilter_rad_s: float) -> ParameterFit:
-    """The plain ``fit``, or that of the other direction where it is the likelier with noise on both signals.
+    """The plain ``fit``, or that of the other direction where it is likelier with noise on both signals.
 
-    A fit that takes a loud input for exact smooths it: its optimum is a delay of tenths of a second with a pole to
-    match, from which no likelihood leads back. In the other direction that noise is the output's.
+    A fit that takes a noisy input as exact smooths it: its optimum is a delay of tenths of a second with a matching
+    pole, from which maximum likelihood does not recover. In the other direction that noise is on the output.
     """
     problem = fit.problem
     direction: Direction = "forward" if problem.settings.direction == "inverse" else "inverse"
@@ -213,12 +213,12 @@ def _errors_in_variables(
     input_, output_ = _input_and_output(problem)
     input_sd, output_sd = fit.noise[input_], noise[output_]
     theta, iterations, converged = fit.theta.copy(), 0, fit.converged
-    # Means of neighbours first: they hold a fraction of the noise, above all of that in the delay's gradient.
+    # Means of neighbours first: they have less noise, above all in the gradient with respect to the delay.
     for level in [problem.coarse(COARSE_SAMPLES), problem]:
         factor = problem.count / max(level.count, 1)
         for _ in range(1 if output_sd else RATIO_ROUNDS):
-            # What the input's noise does not explain is the output's, model errors included: to call them input noise
-            # would overcorrect.
+            # Error that the input's noise does not explain is counted as the output's, model errors included:
+            # counting it as input noise would overcorrect.
             variance = factor * _mean_square(level, theta)
             output = output_sd**2 if output_sd else output_variance(problem, theta, variance, input_sd)
             level, before = level.with_noise_ratio(_noise_ratio(input_sd, output)), theta
@@ -230,7 +230,7 @@ def _errors_in_variables(
                 break
     problem = level
     settled = _settle(problem, theta, found.evaluation, fit.iterations + iterations, converged, "errors_in_variables")
-    # The noise in the gradient adds to the estimate's spread what it does not add to the curvature.
+    # Noise in the gradient adds to the spread of the estimate, but not to the curvature.
     jacobian = problem.jacobian(theta)
     inverse_of_signal = settled.covariance / settled.variance
     covariance = settled.variance * inverse_of_signal @ (jacobian.T @ jacobian) @ inverse_of_signal
@@ -238,7 +238,7 @@ def _errors_in_variables(
 
 
 def _input_and_output(problem: PredictionError) -> tuple[str, str]:
-    """Which signal is which, by the names that ``noise`` has them under."""
+    """The keys of the input and the output in ``noise``."""
     return ("reading", "load") if problem.settings.direction == "inverse" else ("load", "reading")
 
 
@@ -260,7 +260,7 @@ def _mean_square(problem: PredictionError, theta: Array) -> float:
 def _instrumental_if_strong(
     fit: ParameterFit, source: Source, recordings: Sequence[Recording], limits: Termination
 ) -> ParameterFit | None:
-    """The fit by instruments, None where they are too weak: a delay that is held far off leaves them none."""
+    """The fit by instruments; None where they are too weak, as when the delay is fixed far from the true one."""
     try:
         found = _instrumental(fit, source, recordings, limits)
     except NotIdentifiableError:

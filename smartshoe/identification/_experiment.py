@@ -1,4 +1,4 @@
-"""Recordings made ready for identification: one pair of signals each, with what is missing marked."""
+"""Prepares recordings for identification: one pair of signals each, with missing samples masked."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from smartshoe.units import Unit
 Direction = Literal["inverse", "forward"]
 
 FEWEST_SAMPLES = 20
-MOST_SKIPPED = 4  # times as many samples, put back, as there are
+MOST_SKIPPED = 4  # inserted samples per sample present, at most
 SKIPPED_TOLERANCE = 0.05  # of a step
-LEAST_RETURN = 0.1  # of the load's range that must be travelled both ways
+LEAST_RETURN = 0.1  # of the load's range that must be covered both upwards and downwards
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """One recording as load in N and reading in the common reading unit, both (n,), gaps bridged by straight lines.
+    """One recording as load in N and reading in the common reading unit, both (n,), with gaps interpolated linearly.
 
-    ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``mask`` marks the samples whose error
-    counts. ``rows`` says which samples are the recording's, where skipped ones were put back; None: all are.
+    ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``mask`` marks the samples whose error counts.
+    Where samples skipped by the logger were inserted, ``rows`` tells which ones are the recording's; None: all are.
     """
 
     name: str
@@ -43,22 +43,22 @@ class Experiment:
 
     @property
     def sample_time_s(self) -> float:
-        """The even step, or the median of the uneven ones."""
+        """The even sampling step in s, or the median of uneven ones."""
         return self.step if isinstance(self.step, float) else float(np.median(self.step))
 
     def of_recording(self, signal: Any) -> Any:
-        """``signal`` (n,) at the recording's own samples."""
+        """``signal`` (n,) restricted to the recording's own samples."""
         return signal if self.rows is None else signal[self.rows]
 
     def is_of(self, recording: Recording, reading_unit: Unit) -> bool:
-        """Whether load and reading, in ``reading_unit``, are those of ``recording``, whatever either is called."""
+        """Whether load and reading, in ``reading_unit``, equal those of ``recording``, regardless of names."""
         if recording.sensor.unit.quantity != reading_unit.quantity:
             return False
         held = (self.of_recording(self.load_n), self.of_recording(self.reading))
         return all(map(np.array_equal, held, _bridged_signals(recording, reading_unit)))
 
     def decimated(self, factor: int) -> Experiment:
-        """Means of ``factor`` neighbours: a start for a fit, at a fraction of its cost."""
+        """The experiment with means of ``factor`` neighbouring samples, for a cheap start of a fit."""
         blocks = self.time_s.size // factor
         if factor <= 1 or blocks < 2:
             return self
@@ -75,15 +75,15 @@ class Experiment:
 
 
 def block_means(signal: Array, factor: int) -> Array:
-    """(n // factor,) means of ``factor`` neighbours; what does not fill a block is left out."""
+    """(n // factor,) means of ``factor`` neighbours; an incomplete last block is left out."""
     blocks = signal[: signal.size // factor * factor].reshape(-1, factor)
-    # A product is many times faster than a mean over so short an axis.
+    # A matrix product is many times faster than a mean over such a short axis.
     means: Array = blocks @ np.full(factor, 1.0 / factor)
     return means
 
 
 def whole_blocks(mask: Mask, factor: int) -> Mask:
-    """(n // factor,) whether all ``factor`` neighbours are in the mask."""
+    """(n // factor,) whether all samples of a block are in the mask."""
     whole = np.ones(mask.size // factor, dtype=bool)
     broken = np.flatnonzero(~mask) // factor
     whole[broken[broken < whole.size]] = False
@@ -103,12 +103,12 @@ def _unique_names(recordings: Sequence[Recording]) -> list[str]:
 def prepare(
     recordings: Sequence[Recording], counted: Mapping[str, Mask] | None = None, *, on_one_step: bool = True
 ) -> tuple[list[Experiment], Unit]:
-    """The experiments and their common reading unit (the first recording's).
+    """The experiments and their common reading unit (that of the first recording).
 
-    ``counted`` gives, by recording name, the samples (n,) whose error counts; all of them where a name is not given.
-    ``on_one_step`` puts rows that a logger skipped back as samples that do not count.
-    Raises `UnitError` where a reading is of another quantity, `MissingChannelError` without load or reading,
-    `NotIdentifiableError` where the signals cannot hold the answer, naming what is missing.
+    ``counted`` gives, by recording name, the mask (n,) of samples whose error counts; all of them where a name is
+    missing. ``on_one_step`` inserts rows that a logger skipped as samples that do not count. Raises `UnitError` where a
+    reading is of another quantity, `MissingChannelError` without load or reading, `NotIdentifiableError`, naming the
+    reason, where the signals cannot determine the parameters.
     """
     if not recordings:
         raise UsageError("identify was given no recording: give one at least")
@@ -143,7 +143,7 @@ def prepare(
 
 
 def _bridged_signals(recording: Recording, reading_unit: Unit) -> tuple[Array, Array]:
-    """(n,) the load in N and the reading, straight lines where either is missing."""
+    """(n,) load in N and reading, interpolated linearly where either is missing."""
     load, sensor = recording.load, recording.sensor
     return (
         bridged(recording.time_s, load.si, load.present),
@@ -152,10 +152,10 @@ def _bridged_signals(recording: Recording, reading_unit: Unit) -> tuple[Array, A
 
 
 def _on_one_step(experiment: Experiment) -> Experiment:
-    """The experiment with rows that a logger has skipped put back as samples that do not count, where that is all.
+    """The experiment with rows skipped by the logger inserted as uncounted samples, if that makes the step even.
 
-    Straight lines over the gaps, as the model takes them anyway: nothing changes but that even steps are fast, and
-    that a delay moves the input by the better interpolation.
+    They are interpolated linearly, which the model assumes anyway. The results stay the same, but even steps are
+    faster, and a delay then shifts the input by the better interpolation.
     """
     if isinstance(experiment.step, float):
         return experiment
@@ -213,14 +213,14 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
 
 
 def masked(signal: Array, mask: Mask) -> Array:
-    """``signal`` (n,) at the samples that count: itself, or a view, where those lie together."""
+    """``signal`` (n,) at the counted samples; itself, or a view, where those are contiguous."""
     first, count = int(mask.argmax()), int(np.count_nonzero(mask))
     together = slice(first, first + count)
     return signal[together] if mask[together].all() else signal[mask]
 
 
 def _largest_rises(signal: Array) -> tuple[float, float]:
-    """The largest climb from an earlier sample, and fall; over means of a few samples where there are thousands."""
+    """The largest rise and the largest fall from an earlier sample, or of means of a few samples in long signals."""
     few = max(signal.size // 2000, 1)
     coarse = block_means(signal, few) if few > 1 else signal
     return (

@@ -1,4 +1,4 @@
-"""`Identification`: what the data say of a unit, and how well."""
+"""`Identification`: the identified model of a unit, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ SCHEMA = "smartshoe.identification/1"
 class Identification(Summarised):
     """force / reading = (b0 s + b1)/(s + a1), Chinimilli 2016 (13), with its uncertainty.
 
-    ``parameters`` a1, b0, b1 (readings in ``reading_unit``) and k1, k2, c, whatever the ``direction``, which says
-    only which signal's error was minimised, and the ``estimator``, which says what noise was allowed for;
-    ``covariance`` (6, 6) in their order. By recording, ``offsets`` are the readings at no load, ``load_offsets`` the
-    load cell's zero (one of the two is fixed), ``initial_states`` the coefficients of the fading start. ``delay_s`` is
-    positive where the reading is later than the load. ``noise`` is the white noise of load and reading, ``scale`` N
-    per reading unit of the paper's force. ``rmse`` in N (inverse) or reading units (forward).
+    ``parameters`` are a1, b0, b1 (readings in ``reading_unit``) and k1, k2, c, whatever the ``direction`` (which
+    signal's error was minimised) and the ``estimator`` (which noise was allowed for); ``covariance`` (6, 6) is in their
+    order. By recording, ``offsets`` are the readings at no load, ``load_offsets`` the load cell's zero (one of the two
+    is fixed), ``initial_states`` the coefficients of the decaying initial transient. ``delay_s`` is positive where the
+    reading is later than the load. ``noise`` is the white noise of load and reading, ``scale`` N per reading unit of
+    the paper's force. ``rmse`` is in N (inverse) or reading units (forward).
     """
 
     unit: str
@@ -71,10 +71,10 @@ class Identification(Summarised):
     remarks: tuple[str, ...]
     fit: ParameterFit
 
-    # -- what is left ----------------------------------------------------------------------------------------
+    # -- errors ----------------------------------------------------------------------------------------------
     @cached_property
     def errors(self) -> Mapping[str, Array]:
-        """By recording, model minus measured (n,) at every sample, those that did not count too."""
+        """By recording, model minus measured (n,) at every sample, including those that were not counted."""
         problem = self.fit.problem
         return {
             experiment.name: experiment.of_recording(problem.model_error(self.fit.theta, index))
@@ -82,7 +82,7 @@ class Identification(Summarised):
         }
 
     def predicted(self, recording: RecordingLike) -> Array:
-        """What the model says of a recording of this fit.
+        """The model's output for a recording of this fit.
 
         Parameters
         ----------
@@ -97,13 +97,13 @@ class Identification(Summarised):
         Raises
         ------
         UsageError
-            Where the fit did not use this recording, or ``recording`` is none.
+            Where the fit did not use this recording, or ``recording`` is not one.
         """
         name = self._name_of(recording)
         return self._measured[name][1] + self.errors[name]
 
     def _name_of(self, recording: RecordingLike) -> str:
-        """What this fit calls a recording: told by its samples, as several may have come with one name."""
+        """This fit's name for a recording, found by comparing samples, since several may have the same name."""
         if isinstance(recording, str) and recording in self.errors:
             return recording
         fitted = f"use one of {', '.join(self.errors)}"
@@ -117,7 +117,10 @@ class Identification(Summarised):
 
     @cached_property
     def _measured(self) -> Mapping[str, tuple[Array, Array]]:
-        """By recording, times (n,) from its start and the output, fixed zeros in it: errors are model minus this."""
+        """By recording, times (n,) from its start and the output less fixed zeros.
+
+        Errors are the model minus this output.
+        """
         settings = self.fit.problem.settings
         inverse = settings.direction == "inverse"
         zero = (settings.load_offset_n if inverse else settings.offset) or 0.0
@@ -130,7 +133,7 @@ class Identification(Summarised):
         }
 
     def plot(self) -> Figure:
-        """A figure: by recording, the measured signal with the model's, and below it measured minus model."""
+        """A figure: for each recording, the measured signal and the model's, and below them measured minus model."""
         figure, axes = panels(2 * len(self._measured), height=2.0)
         quantity = "load" if self.direction == "inverse" else "reading"
         for upper, lower, (name, (time_s, measured)) in zip(axes[::2], axes[1::2], self._measured.items(), strict=True):
@@ -168,7 +171,7 @@ class Identification(Summarised):
 
     @property
     def residuals(self) -> Mapping[str, Array]:
-        """By recording, measured minus model (n,), NaN where a sample did not count."""
+        """By recording, measured minus model (n,), NaN where a sample was not counted."""
         problem = self.fit.problem
         return {
             experiment.name: np.where(experiment.of_recording(mask), -self.errors[experiment.name], np.nan)
@@ -177,7 +180,7 @@ class Identification(Summarised):
 
     @cached_property
     def fit_percent_by_recording(self) -> Mapping[str, float]:
-        """``fit_percent`` of each recording."""
+        """``fit_percent`` of each recording alone."""
         problem = self.fit.problem
         return {
             experiment.name: fit_percent(y[mask], problem.model_error(self.fit.theta, index)[mask])
@@ -188,21 +191,21 @@ class Identification(Summarised):
 
     @cached_property
     def residual_tests(self) -> Mapping[str, ResidualTest]:
-        """Whiteness, and independence of the input."""
+        """Tests of the residual by name: whiteness, and independence of the input."""
         problem = self.fit.problem
         errors = [problem.model_error(self.fit.theta, index) for index in range(len(problem.experiments))]
         return residual_tests(problem, self.fit.theta, errors)
 
     @cached_property
     def consistency(self) -> ConsistencyTest:
-        """Whether c = 1, the paper's two-parameter form, agrees with the three coefficients (free structure only)."""
+        """Test of the paper's two-parameter form (c = 1) against the three coefficients (free structure only)."""
         if self.structure != "free":
             raise RefusedError("a grey box holds c by itself: ask for the consistency of a free fit")
         return consistency_test(self.coefficients, self.covariance[:3, :3], scale=self.scale)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know of this result, one sentence each."""
+        """Remarks about this result for the user, one sentence each."""
         if self.residual_tests["whiteness"].p_value < 0.01:
             return (
                 *self.remarks,
@@ -212,17 +215,17 @@ class Identification(Summarised):
 
     @property
     def coefficients(self) -> tuple[float, float, float]:
-        """a1 in 1/s, b0 in N per reading unit, b1 in that per s."""
+        """a1 in 1/s, b0 in N per reading unit, b1 in N per reading unit and s."""
         return self.parameters["a1"].value, self.parameters["b0"].value, self.parameters["b1"].value
 
     @property
     def solid(self) -> StandardLinearSolid:
-        """The standard linear solid of the parameters k1, k2, c."""
+        """The standard linear solid with the parameters k1, k2, c."""
         return StandardLinearSolid(*(self.parameters[name].value for name in ("k1", "k2", "c")))
 
     @property
     def correlation(self) -> Array:
-        """(6, 6) correlations in the order of ``parameters``; 0 beside a fixed parameter."""
+        """(6, 6) correlations in the order of ``parameters``; 0 for a fixed parameter."""
         sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         safe = np.where(sd > 0, sd, 1.0)
         matrix: Array = np.clip(self.covariance / np.outer(safe, safe), -1.0, 1.0)
@@ -235,7 +238,7 @@ class Identification(Summarised):
         return float(np.mean([parameter.value for parameter in self.offsets.values()]))
 
     def discrete(self, sample_rate_hz: float | None = None) -> tuple[Array, Array]:
-        """Numerator and denominator of the bilinear filter, by default at the data's rate."""
+        """Numerator and denominator of the bilinear filter, by default at the sampling rate of the data."""
         return discretise(
             *self.coefficients, self.sample_rate_hz if sample_rate_hz is None else sample_rate_hz, "bilinear"
         )
@@ -248,9 +251,9 @@ class Identification(Summarised):
         )
 
     def calibration(self, created: str = "", *, unit: str | None = None) -> Calibration:
-        """The calibration to save, of ``unit`` (the recordings' own where it is not given).
+        """The calibration of ``unit``, ready to be saved; by default of the unit named in the recordings.
 
-        ``created`` is an ISO date where the caller wants one in the file.
+        ``created`` is an ISO date for the file, if wanted.
         """
         from smartshoe.version import __version__
 
@@ -275,7 +278,7 @@ class Identification(Summarised):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The contract's object, schema smartshoe.identification/1; null where a number is not finite."""
+        """The identification as a JSON object, schema smartshoe.identification/1; null where a number is not finite."""
         numerator, denominator = self.discrete()
         names = list(self.parameters)
         return {
@@ -322,6 +325,6 @@ class Identification(Summarised):
 
 @on_one_thread
 def fit_percent(y: Array, error: Array) -> float:
-    """100 (1 - ||error||/||y - mean y||), as MATLAB's compare has it."""
+    """100 (1 - ||error||/||y - mean y||), as in MATLAB's ``compare``."""
     spread = float(np.linalg.norm(y - y.mean())) if y.size else 0.0
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0 else float("nan")

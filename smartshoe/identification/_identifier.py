@@ -56,22 +56,22 @@ def identify(  # noqa: PLR0913 - a public verb
     recordings
         Experiments of the unit: recordings, paths or DataFrames.
     direction : {"inverse", "forward"}
-        Whose error is minimised: the load's, as in the paper, or the reading's. The parameters are those of equation
-        (13) either way.
+        Which signal's error is minimised: the load's, as in the paper, or the reading's. The parameters are those of
+        equation (13) in both cases.
     method : {"trf", "gn", "lm", "srivc"}
-        SRIVC alone, or from it one of the others, which share one residual and gradient.
+        SRIVC alone, or one of the others started from it, which share one residual and gradient.
     structure : {"free", "grey_box"}
         "free" fits a1, b0, b1; "grey_box" k1 and k2, with c = 1 and x_over_nrt as the paper has them unless ``fixed``
         names others.
     estimator : {"auto", "output_error", "errors_in_variables", "command", "cycles"}
-        "output_error" takes the input for exact; "errors_in_variables" knows noise on both; "command" and "cycles"
+        "output_error" takes the input as exact; "errors_in_variables" allows for noise on both; "command" and "cycles"
         take their instruments from the commanded load or from the mean of the other repeats; "auto" fits the first and
-        goes on to another where the input's noise would move the result by a tenth of its error bar, and says so.
+        then another where the input's noise would move the result by a tenth of its error bar, with a note.
     offset, delay, initial_state
-        Reading at no load (one a recording), s by which the reading is later than the load, and what was before:
-        estimated, or fixed.
+        Reading at no load (one per recording), time in s by which the reading is later than the load, and the state at
+        the first sample: estimated, or fixed.
     load_offset_n
-        The load cell's zero in N: one constant cannot be distinguished from the other, so that one of the two is fixed.
+        The load cell's zero in N. It cannot be distinguished from the reading's offset, so one of the two is fixed.
     fixed, bounds
         Parameters of the structure that are known, and limits of those that are free, by name.
     reading_noise, load_noise_n
@@ -131,7 +131,7 @@ def identify(  # noqa: PLR0913 - a public verb
                 tolerance=tolerance,
                 max_iterations=max_iterations,
             )
-        except NotIdentifiableError as error:  # a solver knows signals, and not whose
+        except NotIdentifiableError as error:  # the solver does not know whose signals these are
             raise NotIdentifiableError(f"{several[0].label}: {error}") from error
         if not np.isfinite(fit.theta).all() or not np.isfinite(fit.cost):
             raise NotIdentifiableError(
@@ -146,7 +146,7 @@ def identify(  # noqa: PLR0913 - a public verb
         load_zero_free=isinstance(load_offset_n, str),
         sources=tuple(recording.source or recording.name for recording in several),
     )
-    # What the data leave open is the better reason, where a fit did not settle for it.
+    # Where undetermined parameters kept the fit from converging, report that as the reason.
     found = conclude(replace(fit, notes=(scale_note, *fit.notes)), choice, several[0].label)
     if strict and not fit.converged:
         raise NotConvergedError(
@@ -173,7 +173,7 @@ def _check_choices(direction: str, method: str, structure: str, initial_state: s
 
 
 def _fixed(name: str, value: float | str) -> float | None:
-    """None where ``value`` is "estimate", else the number."""
+    """``value`` as a number, or None where it is "estimate"."""
     if value == "estimate":
         return None
     if not isinstance(value, Real) or not np.isfinite(value):
@@ -213,7 +213,7 @@ def _form(
     fixed: Mapping[str, float] | None,
     bounds: Mapping[str, tuple[float, float]] | None,
 ) -> Parametrisation:
-    # With the scale free as well the grey box has the free form's three numbers, read back with c = 1.
+    # With a free scale the grey box is equivalent to the free form, interpreted with c = 1.
     if structure == "free" or newtons is None:
         if fixed or bounds:
             raise UsageError("fixed and bounds belong to the grey box: set structure to 'grey_box' and give a scale")
@@ -228,7 +228,7 @@ def _unit_name(recordings: Sequence[Recording]) -> str:
 def _scale(
     recordings: Sequence[Recording], reading_unit: Unit, scale: float | str | None, structure: str
 ) -> tuple[float | None, str]:
-    """N per reading unit of the paper's force (None to estimate it), and where it came from in one sentence."""
+    """N per reading unit of the paper's force (None to estimate it), and its origin in one sentence."""
     if isinstance(scale, str):
         if scale != "estimate" or structure != "grey_box":
             raise UsageError(f"scale is {scale!r}: give a number, or 'estimate' with structure 'grey_box'")

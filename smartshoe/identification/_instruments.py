@@ -1,8 +1,8 @@
-"""Instrumental variables: the gradient of a noise-free stand-in for the input, so that its noise does not bias.
+"""Instrumental variables: the gradient along a noise-free substitute for the input, so that its noise causes no bias.
 
-The estimate solves Z'e = 0 with Z the gradient along the stand-in and e the prediction error along the measured
-signals (Soderstrom and Stoica 1983, *Instrumental Variable Methods for System Identification*). The stand-in needs to
-follow the true input and to share no noise with it; it need not be exact.
+The estimate solves Z'e = 0, where Z is the gradient along the substitute and e the prediction error along the measured
+signals (Soderstrom and Stoica 1983, *Instrumental Variable Methods for System Identification*). The substitute must
+follow the true input and share no noise with it; it need not be exact.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from smartshoe.models.first_order import lag, shifted
 Source = Literal["command", "cycles"]
 LEAST_CORRELATION = 0.9
 LONGEST_STEP = 0.5  # of ln alpha
-MOST_ITERATIONS = 50  # Newton settles in five or not at all
+MOST_ITERATIONS = 50  # Newton converges in five or not at all
 HALVINGS = 4
 
 
 class Instruments:
-    """Stand-ins for the input of each recording: the commanded load, or the mean of the other repeats' readings."""
+    """Substitutes for the input of each recording: the commanded load, or the mean of the other repeats' readings."""
 
     def __init__(self, problem: PredictionError, source: Source, readings: Sequence[Array] | None = None) -> None:
         self.problem, self.source = problem, source
@@ -60,7 +60,7 @@ class Instruments:
             )
 
     def _stand_in(self, theta: Array, index: int) -> tuple[Array, Array]:
-        """The noise-free input (n,) at the delay, and its derivative with respect to it."""
+        """The noise-free input (n,) with the delay applied, and its derivative with respect to the delay."""
         problem, experiment = self.problem, self.problem.experiments[index]
         inverse = problem.settings.direction == "inverse"
         delay_s = problem.delay_s(theta)
@@ -75,7 +75,7 @@ class Instruments:
             command_n = np.interp(experiment.time_s, experiment.time_s[finite], command_n[finite])
         u = command_n
         if inverse:
-            # What the model would read under the commanded load, delay already undone.
+            # The model's reading under the commanded load, with the delay already removed.
             a1, b0, b1 = (float(value) for value in problem.coefficients(theta)[0])
             slow = lag(command_n, b1 / b0, experiment.step)
             u = (command_n - slow) / b0 + (a1 / b1) * slow
@@ -83,7 +83,7 @@ class Instruments:
         return u, slope if inverse else -slope
 
     def equations(self, theta: Array) -> tuple[Array, Array, Array, float]:
-        """Z'e (size,), Z'J and Z'Z (size, size), and e'e over the samples that count."""
+        """Z'e (size,), Z'J and Z'Z (size, size), and e'e, over the counted samples."""
         size = self.problem.size
         right, normal, power = np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
         cost = 0.0
@@ -98,17 +98,17 @@ class Instruments:
 
     @property
     def count(self) -> int:
-        """How many samples count."""
+        """The number of counted samples."""
         return sum(int(np.count_nonzero(usable)) for usable in self.usable)
 
 
 def solve_instrumental(
     instruments: Instruments, theta: Array, sd: Array, *, tolerance: float, max_iterations: int
 ) -> tuple[Array, Array, float, int, bool]:
-    """theta, its covariance, the error's variance, iterations, and whether the equations were solved.
+    """theta, its covariance, the error's variance, the number of iterations, and whether the equations were solved.
 
-    Newton on Z'e = 0, until a step is 1e-5 of ``sd`` (size,), the output-error fit's. The covariance is
-    variance (Z'J)^-1 Z'Z (J'Z)^-1.
+    Newton on Z'e = 0, until a step is below 1e-5 of ``sd`` (size,), the standard deviations of the output-error fit.
+    The covariance is variance (Z'J)^-1 Z'Z (J'Z)^-1.
     """
     problem = instruments.problem
     converged, iterations = False, 0
@@ -124,7 +124,7 @@ def solve_instrumental(
             following = instruments.equations(trial)
             if best is None or _merit(following) < _merit(best[1]):
                 best = trial, following
-            # The instruments move with theta as well, which Newton's step does not know: it may swing about the root.
+            # The instruments change with theta too, which Newton's step ignores: it may oscillate about the root.
             if _merit(best[1]) < 0.5 * _merit(seen):
                 break
             fraction /= 2
@@ -142,7 +142,7 @@ def solve_instrumental(
 
 
 def _merit(equations: tuple[Array, Array, Array, float]) -> float:
-    """e'Z (Z'Z)^-1 Z'e: what of the error the instruments still explain."""
+    """e'Z (Z'Z)^-1 Z'e: the part of the squared error that the instruments still explain."""
     right, _, power, _ = equations
     return float(right @ solve_normal(power, right)) if np.isfinite(power).all() else np.inf
 

@@ -1,4 +1,4 @@
-"""How noisy the input is, and what that does to a fit that takes it for exact."""
+"""Estimates the input's noise, and the bias it causes in a fit that takes the input as exact."""
 
 from __future__ import annotations
 
@@ -13,19 +13,22 @@ from smartshoe.identification._solve import solve_normal
 from smartshoe.models.first_order import interpolation_gain
 from smartshoe.signals.noise import white_noise_sd
 
-MATTERS = 0.1  # of a standard error: a smaller bias is not worth another estimator
-DIFFERENCES = 4000  # third differences looked at
+MATTERS = 0.1  # of a standard error: a smaller bias does not justify another estimator
+DIFFERENCES = 4000  # third differences used, at most
 IMPULSE_SAMPLES = 512
 
 
 def noise_sds(experiments: Sequence[Experiment]) -> tuple[float, float]:
-    """White noise of the load in N and of the reading in its unit, a converter's step included."""
+    """Standard deviations of white noise of the load in N and of the reading in its unit, including quantisation."""
     usable = [experiment for experiment in experiments if experiment.mask.any()]
     return _noise_sd([one.load_n for one in usable]), _noise_sd([one.reading for one in usable])
 
 
 def _noise_sd(signals: Sequence[Array]) -> float:
-    """Of ``signals`` (n,); where values come back they are levels, a step the usual distance between neighbours."""
+    """White noise sd of ``signals``, (n,) each, including the quantisation step where values recur.
+
+    The step is the median distance between neighbouring distinct values.
+    """
     levels = [np.unique(one) for one in signals]
     steps = [np.diff(own) for one, own in zip(signals, levels, strict=True) if 2 <= own.size <= one.size // 2]
     step = float(np.median(np.concatenate(steps))) if steps else 0.0
@@ -33,10 +36,10 @@ def _noise_sd(signals: Sequence[Array]) -> float:
 
 
 def input_noise_bias(problem: PredictionError, theta: Array, normal: Array, input_sd: float) -> Array:
-    """(size,) what white noise of ``input_sd`` on the input adds to an output-error estimate of theta.
+    """(size,) bias of an output-error estimate of theta due to white noise of ``input_sd`` on the input.
 
-    The cost grows by count sd^2 |G|^2, with G from noise to error; its gradient, taken through ``normal`` (size,
-    size), moves the minimum (Soderstrom 2007, Automatica 43, 939-958).
+    The noise raises the cost by count sd^2 |G|^2, with G the response from noise to error; the gradient of this,
+    divided by ``normal`` (size, size), shifts the minimum (Soderstrom 2007, Automatica 43, 939-958).
     """
     first = problem.experiments[0]
     along, power = _answer(problem, theta)
@@ -51,20 +54,20 @@ def input_noise_bias(problem: PredictionError, theta: Array, normal: Array, inpu
 
 
 def output_variance(problem: PredictionError, theta: Array, variance: float, input_sd: float) -> float:
-    """What of the error's ``variance`` the input's noise does not account for; never below a thousandth of it."""
+    """The error's ``variance`` less the part due to the input's noise; at least a thousandth of it."""
     first = problem.experiments[0]
     gain, _ = interpolation_gain(problem.delay_s(theta), first.time_s, first.step)
     return max(variance - input_sd**2 * gain * _answer(problem, theta)[1], 1e-3 * variance)
 
 
 def _answer(problem: PredictionError, theta: Array) -> tuple[Array, float]:
-    """The response to a unit impulse: its products (3,) with its own derivatives over (ln alpha, p1, p2), its power."""
+    """Inner products (3,) of the impulse response with its derivatives over (ln alpha, p1, p2), and its energy."""
     from smartshoe.kernels.first_order import COLUMNS, inner_products
 
     shape, impulse = problem.shape(theta), np.zeros(IMPULSE_SAMPLES)
     impulse[1] = 1.0
     products, step_s = np.zeros((COLUMNS, COLUMNS)), problem.experiments[0].sample_time_s
-    # Without an output to compare with, the error is the response.
+    # With an output of zero, the error is the response itself.
     inner_products(
         impulse, NONE, np.zeros_like(impulse), EVERY, step_s, None, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0,
         NOT_STORED, products,

@@ -1,7 +1,7 @@
-"""What the fit may move: three free coefficients, or the springs and the damper of the solid (grey box).
+"""The parameters of the fit: three free coefficients, or springs and damper of the solid (grey box).
 
-Either way the error is written in (ln alpha, p1, p2): the pole, the gain at high frequency and the static gain of the
-response in the fitted direction, far less correlated than the coefficients of Chinimilli 2016 (13).
+In either case the error is written in (ln alpha, p1, p2): the pole, the high-frequency gain and the static gain of the
+response in the fitted direction, which are far less correlated than the coefficients of Chinimilli 2016 (13).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from smartshoe.models import X_OVER_NRT
 
 Structure = Literal["free", "grey_box"]
 GREY_NAMES = ("k1", "k2", "c", "x_over_nrt")
-GREY_FIXED = {"c": 1.0, "x_over_nrt": X_OVER_NRT}  # as the paper has it
+GREY_FIXED = {"c": 1.0, "x_over_nrt": X_OVER_NRT}  # as in the paper
 SAME = np.eye(3)
-LEAST = 1e-9  # of k2 and c, which must stay positive
+LEAST = 1e-9  # lower bound of k2 and c, which must stay positive
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """``values`` (alpha, p1, p2) and the derivative (3, k) of (ln alpha, p1, p2) over the free parameters."""
+    """``values`` (alpha, p1, p2), and the derivative (3, k) of (ln alpha, p1, p2) over the free parameters."""
 
     alpha: float
     p1: float
@@ -36,22 +36,22 @@ class Shape:
 
 @dataclass(frozen=True)
 class FreeForm:
-    """theta = (ln alpha, p1, p2)."""
+    """The free structure, theta = (ln alpha, p1, p2)."""
 
     direction: Direction
     names: tuple[str, ...] = ("ln_alpha", "p1", "p2")
 
     @property
     def size(self) -> int:
-        """How many parameters it has: three."""
+        """The number of parameters: three."""
         return 3
 
     def bounds(self) -> tuple[Array, Array]:
-        """None but what keeps the exponential finite."""
+        """Bounds (3,) that only keep the exponential finite."""
         return np.array([-30.0, -np.inf, -np.inf]), np.array([30.0, np.inf, np.inf])
 
     def shape(self, theta: Array) -> Shape:
-        """The response at ``theta``."""
+        """The response (alpha, p1, p2) at ``theta``, with its derivative."""
         return Shape(float(np.exp(theta[0])), float(theta[1]), float(theta[2]), SAME)
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
@@ -59,7 +59,7 @@ class FreeForm:
         return coefficients_of(self.shape(theta), self.direction)
 
     def from_coefficients(self, a1: float, b0: float, b1: float) -> Array:
-        """theta of a1, b0, b1."""
+        """theta for given a1, b0, b1."""
         if self.direction == "inverse":
             return np.array([np.log(a1), b0, b1 / a1])
         return np.array([np.log(abs(b1 / b0)), 1 / b0, a1 / b1])
@@ -67,7 +67,10 @@ class FreeForm:
 
 @dataclass(frozen=True)
 class GreyBox:
-    """theta = those of k1, k2, c and X = x0^2/(nRT) that are not ``fixed``; ``scale`` N per reading unit of force."""
+    """The grey box; theta holds those of k1, k2, c and X = x0^2/(nRT) that are not ``fixed``.
+
+    ``scale`` is N per reading unit of force.
+    """
 
     direction: Direction
     scale: float
@@ -91,16 +94,16 @@ class GreyBox:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The free ones, in the order of theta."""
+        """Names of the free parameters, in the order of theta."""
         return tuple(name for name in GREY_NAMES if name not in self.fixed)
 
     @property
     def size(self) -> int:
-        """How many are free."""
+        """The number of free parameters."""
         return len(self.names)
 
     def bounds(self) -> tuple[Array, Array]:
-        """The user's limits; k2, c and X stay positive."""
+        """The user's bounds, with k2, c and X kept positive."""
         limits = [
             (max(low, LEAST) if name != "k1" else low, high)
             for name in self.names
@@ -129,13 +132,13 @@ class GreyBox:
         return values, np.array([slopes[name] for name in self.names]).T
 
     def solid(self, theta: Array) -> tuple[Array, Array]:
-        """(k1, k2, c) and their derivative (3, k) over theta: 0 in the rows of fixed ones."""
+        """(k1, k2, c) and their derivative (3, k) over theta, with zero rows for fixed ones."""
         names = self.names
         slope = np.array([[1.0 if name == own else 0.0 for own in names] for name in GREY_NAMES[:3]])
         return np.array(self._all(theta)[:3]), slope.reshape(3, len(names))
 
     def shape(self, theta: Array) -> Shape:
-        """The response at ``theta``."""
+        """The response (alpha, p1, p2) at ``theta``, with its derivative."""
         (a1, b0, b1), slope = self.coefficients(theta)
         static = b1 / a1
         static_slope = (slope[2] - static * slope[0]) / a1
@@ -149,7 +152,7 @@ class GreyBox:
         )
 
     def from_coefficients(self, a1: float, b0: float, b1: float) -> Array:
-        """theta near a1, b0, b1: exact where three are free, else a start."""
+        """theta near a1, b0, b1: exact where three parameters are free, otherwise a starting point."""
         free = self.names
         x = self.fixed.get("x_over_nrt", X_OVER_NRT)
         static = b1 / (a1 * self.scale)

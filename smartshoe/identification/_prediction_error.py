@@ -1,8 +1,8 @@
 """The prediction error of the first-order model: one residual and one analytic gradient for every method.
 
-Written for an input u and an output y, as y = p1 (u - w) + p2 w + offset + h exp(-alpha t), where w = alpha/(s +
-alpha) u started in steady state. `PredictionError.evaluate`, `model_error` and `model_error_and_slopes` take one
-compiled pass over the data; `residual`, `jacobian` and `error_and_slopes`, from plain filters, are their slow twins.
+For an input u the output is y = p1 (u - w) + p2 w + offset + h exp(-alpha t), where w = alpha/(s + alpha) u starts in
+steady state. `PredictionError.evaluate`, `model_error` and `model_error_and_slopes` make one compiled pass over the
+data; `residual`, `jacobian` and `error_and_slopes`, made of plain filters, are their slow twins.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from smartshoe.models.first_order import (
 )
 
 LARGEST_DELAY_S = 0.5
-EDGE_SAMPLES = HALF_WIDTH  # at either end, whose delayed input lies beyond the log
+EDGE_SAMPLES = HALF_WIDTH  # left out at either end, where the delayed input lies outside the log
 COARSEST_STEP_S = 0.05
 IMPULSE_SAMPLES = 2048
-MOST_NOISE = 0.99  # of the gradient's inner products, in any direction of theta
+MOST_NOISE = 0.99  # largest share of noise in the gradient's inner products, in any direction of theta
 NONE = np.zeros(0)
 EVERY = np.zeros(0, dtype=bool)
 NOT_STORED = np.zeros((0, 0))
@@ -38,10 +38,11 @@ NOT_STORED = np.zeros((0, 0))
 
 @dataclass(frozen=True)
 class Settings:
-    """What is fitted: a float fixes a nuisance, None estimates it. ``offset`` in reading units, ``delay_s`` in s.
+    """What is fitted: a number fixes a nuisance parameter, None estimates it.
 
-    ``load_offset_n`` is the load's own zero; the free constant at the output stands for either. ``noise_ratio`` is
-    the variance of the input's noise over that of the output's (0: only the output is noisy).
+    ``offset`` in reading units, ``delay_s`` in s. ``load_offset_n`` is the load's own zero; the single free constant at
+    the output represents either. ``noise_ratio`` is the variance of the input's noise over that of the output's (0:
+    only the output is noisy).
     """
 
     direction: Direction = "inverse"
@@ -56,8 +57,9 @@ class Settings:
 class PredictionError:
     """Residual (model minus measured, counted samples only), whitened where the input is noisy too.
 
-    theta = the parametrisation's unknowns, then the delay in s where it is estimated, then one constant at the output
-    and one initial state a recording where they are. All but the pole and the delay enter the free form linearly.
+    theta holds the parametrisation's unknowns, then the delay in s where it is estimated, then for each recording one
+    constant at the output and one initial state where they are estimated. In the free form all but the pole and the
+    delay enter linearly.
     """
 
     def __init__(
@@ -88,7 +90,7 @@ class PredictionError:
         self._pairs = [self._signals(experiment) for experiment in self.experiments]
         from smartshoe.kernels.first_order import COLUMNS
 
-        # From the columns of a recording's pass to theta and the error: constants and states are its own.
+        # Maps the columns of a recording's pass to theta and the error; each recording has its own constant and state.
         self._columns = [np.zeros((COLUMNS, self.size + 1)) for _ in self.experiments]
         for index, own in enumerate(self._columns):
             own[-1, -1] = 1.0
@@ -99,7 +101,7 @@ class PredictionError:
         self._delayed: tuple[float, list[tuple[Array, Array]]] | None = None
 
     def _signals(self, experiment: Experiment) -> tuple[Array, Array]:
-        """Input and output with the fixed zeros taken out."""
+        """Input and output, less their fixed zeros."""
         load = experiment.load_n - self.settings.load_offset_n if self.settings.load_offset_n else experiment.load_n
         zero = self.settings.offset or 0.0
         reading = experiment.reading - zero if zero else experiment.reading
@@ -107,7 +109,7 @@ class PredictionError:
 
     # -- parameters ------------------------------------------------------------------------------------------
     def shape(self, theta: Array) -> Shape:
-        """The response at ``theta``."""
+        """The response (alpha, p1, p2) at ``theta``, with its derivative."""
         return self.form.shape(theta[: self.shape_size])
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
@@ -119,15 +121,15 @@ class PredictionError:
         return float(self.settings.delay_s or 0.0) if self.delay_at is None else float(theta[self.delay_at])
 
     def constant(self, theta: Array, index: int) -> float:
-        """The free constant at the output of one recording; 0 where there is none."""
+        """The free constant at the output of one recording; 0 where it has none."""
         return 0.0 if self.offset_at is None else float(theta[self.offset_at + index])
 
     def state(self, theta: Array, index: int) -> float:
-        """The coefficient of the fading start of one recording."""
+        """The coefficient of the decaying initial transient of one recording."""
         return 0.0 if self.state_at is None else float(theta[self.state_at + index])
 
     def drop_edges(self, count: int) -> None:
-        """Leave ``count`` samples at either end of every recording out of the error."""
+        """Exclude ``count`` samples at either end of every recording from the error."""
         for index, experiment in enumerate(self.experiments):
             mask = experiment.mask.copy()
             if mask.size > 4 * count:
@@ -137,17 +139,17 @@ class PredictionError:
 
     @property
     def count(self) -> int:
-        """How many samples count."""
+        """The number of counted samples."""
         return sum(int(np.count_nonzero(mask)) for mask in self.masks)
 
     # -- signals ---------------------------------------------------------------------------------------------
     @property
     def outputs(self) -> list[Array]:
-        """Per recording the output (n,), fixed zeros taken out."""
+        """For each recording the output (n,), less fixed zeros."""
         return [y for _, y in self._pairs]
 
     def inputs_at(self, delay_s: float) -> list[Array]:
-        """Per recording the input (n,) with ``delay_s`` undone."""
+        """For each recording the input (n,), shifted to compensate ``delay_s``."""
         if delay_s == 0.0:
             return [u for u, _ in self._pairs]
         sign = 1.0 if self.settings.direction == "inverse" else -1.0
@@ -157,7 +159,7 @@ class PredictionError:
         ]
 
     def coarse(self, most: int) -> PredictionError:
-        """This problem on means of neighbouring samples, about ``most`` of them; itself where it is small."""
+        """This problem on means of neighbouring samples, about ``most`` of them; itself where it is small already."""
         total = sum(experiment.time_s.size for experiment in self.experiments)
         step_s = max(experiment.sample_time_s for experiment in self.experiments)
         factor = min(max(total // most, 1), max(int(COARSEST_STEP_S / step_s), 1))
@@ -166,7 +168,7 @@ class PredictionError:
         return self._coarse
 
     def with_noise_ratio(self, ratio: float) -> PredictionError:
-        """This problem with the input's noise allowed for."""
+        """This problem with input noise allowed for."""
         return PredictionError(self.experiments, replace(self.settings, noise_ratio=ratio), self.form, self.masks)
 
     def thinned(self, factor: int) -> PredictionError:
@@ -181,7 +183,7 @@ class PredictionError:
         return PredictionError(few, self.settings, self.form, masks)
 
     def delayed(self, theta: Array) -> list[tuple[Array, Array]]:
-        """Per recording the input at the delay, and its derivative with respect to it (empty where it is fixed)."""
+        """For each recording the delayed input and its derivative over the delay (empty where that is fixed)."""
         delay_s = self.delay_s(theta)
         if self._delayed is not None and self._delayed[0] == delay_s:
             return self._delayed[1]
@@ -196,9 +198,9 @@ class PredictionError:
         self._delayed = (delay_s, found)
         return found
 
-    # -- the error, in one pass --------------------------------------------------------------------------------
+    # -- the error in one compiled pass ------------------------------------------------------------------------
     def evaluate(self, theta: Array) -> Evaluation:
-        """Cost, gradient and normal matrix at ``theta``: no residual is stored."""
+        """Cost, gradient and normal matrix at ``theta``, without storing the residual."""
         if self.settings.noise_ratio:
             return self._evaluate_plainly(theta)
         sums, shape = np.zeros((self.size + 1, self.size + 1)), self.shape(theta)
@@ -208,13 +210,13 @@ class PredictionError:
         return Evaluation(float(sums[-1, -1]), sums[:-1, -1], sums[:-1, :-1], self.count)
 
     def _to_theta(self, shape: Shape, index: int) -> Array:
-        """(COLUMNS, size + 1) from the columns of one recording's pass to theta and the error."""
+        """(COLUMNS, size + 1) matrix that maps the columns of one recording's pass to theta and the error."""
         own = self._columns[index].copy()
         own[:3, : self.shape_size] = shape.slope
         return own
 
     def _pass(self, theta: Array, shape: Shape, index: int, stored: Array) -> Array:
-        """`inner_products` (COLUMNS, COLUMNS) of one recording at ``theta``, its columns into ``stored``."""
+        """`inner_products` (COLUMNS, COLUMNS) of one recording at ``theta``; writes its columns into ``stored``."""
         from smartshoe.kernels.first_order import COLUMNS, inner_products
 
         products = np.zeros((COLUMNS, COLUMNS))
@@ -240,13 +242,13 @@ class PredictionError:
     def _evaluate_plainly(self, theta: Array) -> Evaluation:
         residual, jacobian = self.residual_and_jacobian(theta)
         cost, normal = float(residual @ residual), jacobian.T @ jacobian
-        # The noise in the gradient belongs to no curvature of the likelihood: left in, it would shorten every step.
+        # Noise in the gradient is not curvature of the likelihood: left in, it would shorten every step.
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
         root = vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))
         half = (vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))).T / scale
         shares, axes = np.linalg.eigh(half @ (cost * self._noise_of_gradient(theta)) @ half.T)
-        # Far from the optimum the expectation may exceed what is there: some curvature is always left.
+        # Far from the optimum the expectation may exceed the actual matrix: always leave some curvature.
         left = (root.T * scale).T @ axes
         signal = (left * (1.0 - np.minimum(shares, MOST_NOISE))) @ left.T
         return Evaluation(cost, jacobian.T @ residual, signal, residual.size)
@@ -254,7 +256,7 @@ class PredictionError:
     def _noise_of_gradient(self, theta: Array) -> Array:
         """(size, size) expected inner products of the whitened error's gradient with itself due to noise alone.
 
-        Relative to the error's variance; from the gradient's responses to an impulse at the input and at the output.
+        Relative to the error's variance; computed from the gradient's impulse responses to input and output.
         """
         white = self.whitening(theta)
         if white is None:
@@ -278,9 +280,9 @@ class PredictionError:
         products: Array = self.settings.noise_ratio * from_input @ from_input.T + from_output @ from_output.T
         return products
 
-    # -- the error, stored -------------------------------------------------------------------------------------
+    # -- the stored error --------------------------------------------------------------------------------------
     def residual(self, theta: Array) -> Array:
-        """(m,) model minus measured of the counted samples, in units of the output; whitened where asked for."""
+        """(m,) model minus measured at the counted samples, in output units; whitened where that is enabled."""
         return self.residual_and_jacobian(theta)[0]
 
     def jacobian(self, theta: Array) -> Array:
@@ -288,7 +290,7 @@ class PredictionError:
         return self.residual_and_jacobian(theta)[1]
 
     def residual_and_jacobian(self, theta: Array) -> tuple[Array, Array]:
-        """Both, from plain filters over whole signals."""
+        """(m,) `residual` and (m, size) `jacobian`, from plain filters over whole signals."""
         errors, slopes = [], []
         white = self.whitening(theta)
         for index, mask in enumerate(self.masks):
@@ -300,7 +302,7 @@ class PredictionError:
         return np.concatenate(errors), np.concatenate(slopes, axis=1).T
 
     def whitening(self, theta: Array) -> Whitening | None:
-        """The filter that makes the error white where the input is noisy; None where it is not."""
+        """The filter that whitens the error where the input is noisy; None where it is not."""
         if not self.settings.noise_ratio:
             return None
         step = self.experiments[0].sample_time_s
@@ -315,7 +317,7 @@ class PredictionError:
         return whitening(self.shape(theta), slope, step, self.settings.noise_ratio * gain, ratio_slope)
 
     def model_error(self, theta: Array, index: int) -> Array:
-        """(n,) model minus measured of one recording at every sample, missing ones too; never whitened."""
+        """(n,) model minus measured of one recording at every sample, including missing ones; never whitened."""
         from smartshoe.kernels.first_order import respond
 
         experiment, shape, u = self.experiments[index], self.shape(theta), self.delayed(theta)[index][0]
@@ -326,7 +328,7 @@ class PredictionError:
         return error
 
     def model_error_and_slopes(self, theta: Array, index: int) -> tuple[Array, Array]:
-        """What `error_and_slopes` gives, from the compiled pass."""
+        """The same as `error_and_slopes`, from the compiled pass."""
         from smartshoe.kernels.first_order import COLUMNS
 
         stored, shape = np.empty((COLUMNS, self.experiments[index].time_s.size)), self.shape(theta)
@@ -339,7 +341,7 @@ class PredictionError:
     ) -> tuple[Array, Array]:
         """(n,) model minus measured of one recording and its derivatives (size, n) over theta.
 
-        ``signals`` stands in for the delayed input and its slope: an instrument's.
+        ``signals`` replaces the delayed input and its slope, to compute an instrument's gradient.
         """
         u, u_slope = self.delayed(theta)[index] if signals is None else signals
         experiment, shape = self.experiments[index], self.shape(theta)

@@ -1,4 +1,4 @@
-"""What the residual still holds: whiteness, and independence of the input."""
+"""Tests of the residual: whiteness, and independence of the input."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from smartshoe.models.parameter import finite_or_none
 
 WHITENESS_LAGS = 20
 INPUT_LAGS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
-BLOCKS = 1500  # means of samples that the input's test looks at
+BLOCKS = 1500  # means of samples that the test of input independence uses
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualTest:
-    """A chi-square ``statistic`` of ``degrees`` degrees of freedom and its ``p_value``: small where the law fails."""
+    """A chi-square ``statistic`` of ``degrees`` degrees of freedom; ``p_value`` is small where the hypothesis fails."""
 
     statistic: float
     p_value: float
     degrees: int
 
     def to_dict(self) -> dict[str, Any]:
-        """The contract's object."""
+        """The test as a JSON object."""
         return {
             "statistic": finite_or_none(self.statistic),
             "p_value": finite_or_none(self.p_value),
@@ -37,7 +37,7 @@ class ResidualTest:
 
 
 def residual_tests(problem: PredictionError, theta: Array, errors: Sequence[Array]) -> dict[str, ResidualTest]:
-    """Whiteness and input independence of the prediction error ``errors`` (one (n,) a recording) at ``theta``."""
+    """Tests of whiteness and input independence of the prediction errors (one (n,) per recording) at ``theta``."""
     white = problem.whitening(theta)
     if white is not None:
         errors = [
@@ -70,11 +70,11 @@ def _chi_square_tail(degrees: int, statistic: float) -> float:
 
 
 def input_independence(problem: PredictionError, theta: Array, errors: Sequence[Array]) -> ResidualTest:
-    """Score test of whether the residual still leans on the input at lags 0 to 256 samples.
+    """Score test of whether the residual still correlates with the input at lags of 0 to 256 samples.
 
-    The delayed inputs are cleared of what the fit has already used (its Jacobian), so the statistic is chi-square with
-    their rank under white residuals. A slow dynamic left out shows here. Looked at in means of a few samples, which
-    are as white as the samples.
+    The part of the delayed inputs that the fit has used (its Jacobian) is projected out, so that under white residuals
+    the statistic is chi-square with their rank. Slow dynamics missing from the model show here. It uses means of a few
+    samples, which are as white as the samples.
     """
     from smartshoe.kernels.residual import orthogonalise
 
@@ -93,7 +93,7 @@ def input_independence(problem: PredictionError, theta: Array, errors: Sequence[
         row *= inside
         rows.append(row)
         residuals.append(block_means(error, factor) * inside)
-    # Beside each other: what the fit has used, then the delayed inputs.
+    # Columns: the fit's Jacobian, then the delayed inputs.
     both, error = np.concatenate(rows, axis=1), np.concatenate(residuals)
     lagged = both[size:]
     # Differences of neighbouring lags are far less collinear than the lags themselves.

@@ -1,7 +1,7 @@
 """Non-linear least squares on normal equations: Gauss-Newton, Levenberg-Marquardt, trust region reflective.
 
-The three differ in how they take a step. They share the problem's error and gradient, the bounds and the test that
-ends them, so that they end at one optimum.
+The three differ in how they take a step. They share the problem's error and gradient, the bounds and the termination
+test, so that they end at the same optimum.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from smartshoe.errors import NotIdentifiableError
 
 Solver = Literal["gn", "lm", "trf"]
 
-# A Gauss-Newton step that promises less than this share of one residual's variance is a ten-thousandth of a
-# standard error long, and once it is taken what is left is of second order.
+# A Gauss-Newton step predicted to gain less than this share of one residual's variance is 1e-4 standard errors
+# long; after it the remaining distance to the optimum is of second order.
 NEGLIGIBLE = 1e-8
-ROUNDING = 1e-14  # of the cost: below it a change is arithmetic, not descent
+ROUNDING = 1e-14  # of the cost: a smaller change is rounding, not descent
 SINGULAR = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """At one theta: ``cost`` = e'e, ``gradient`` (p,) = J'e, ``normal`` (p, p) = J'J, ``count`` errors in e."""
+    """Results at one theta: ``cost`` = e'e, ``gradient`` (p,) = J'e, ``normal`` (p, p) = J'J, ``count`` of errors e."""
 
     cost: float
     gradient: Array
@@ -35,11 +35,11 @@ class Evaluation:
 
 
 class Problem(Protocol):
-    """What `minimise` needs: bounds (size,), infinite where there are none, and one pass over the data."""
+    """What `minimise` requires: bounds (size,), infinite where there are none, and one pass over the data."""
 
     @property
     def size(self) -> int:
-        """How many unknowns."""
+        """The number of unknowns."""
 
     @property
     def lower(self) -> Array:
@@ -55,7 +55,7 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Minimum:
-    """Where `minimise` ended, what it saw there, after how many ``iterations``, and whether it settled."""
+    """The result of `minimise`: theta, the evaluation there, the number of ``iterations``, and whether it converged."""
 
     theta: Array
     evaluation: Evaluation
@@ -64,8 +64,8 @@ class Minimum:
 
 
 def solve_normal(normal: Array, right: Array) -> Array:
-    """x with normal x = right, columns scaled by their norm; the smallest x where it is singular."""
-    scale = np.sqrt(np.maximum(normal.diagonal(), 0.0))  # a column of nothing, rounded
+    """x with normal x = right, columns scaled by their norm; the x of smallest norm where the matrix is singular."""
+    scale = np.sqrt(np.maximum(normal.diagonal(), 0.0))  # rounding may make a zero column's entry negative
     if not scale.all():
         scale = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(normal / (scale[:, np.newaxis] * scale))
@@ -80,9 +80,9 @@ def solve_normal(normal: Array, right: Array) -> Array:
 
 
 def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float, max_iterations: int) -> Minimum:
-    """The least squares from ``theta``; ``tolerance`` is the relative change of theta that ends the iteration.
+    """The least-squares solution from ``theta`` on; ``tolerance`` is the relative change of theta at which it ends.
 
-    It also ends where the full Gauss-Newton step, which is still taken, is below 1e-4 standard errors. Raises
+    It also ends where the full Gauss-Newton step, which is then still taken, is below 1e-4 standard errors. Raises
     `NotIdentifiableError` where the normal equations have no finite solution.
     """
     theta = np.minimum(np.maximum(theta, problem.lower), problem.upper)
@@ -97,7 +97,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
         newton = _newton_step(now, free)
         promised = float(newton @ now.gradient)
         if promised <= NEGLIGIBLE * now.cost / max(now.count, 1):
-            # The step is worth taking, a new look at the data is not.
+            # The step is worth taking, but not another pass over the data.
             last = np.minimum(np.maximum(theta - newton, problem.lower), problem.upper)
             return Minimum(last, now, iteration, True)
         for _ in range(60):
@@ -110,7 +110,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
             if accepted or float(np.max(np.abs(move) / (np.abs(theta) + 1e-300))) < 1e-16:
                 break
         if not accepted:
-            # No descent is left within rounding: this is the optimum if little was promised.
+            # No further descent beyond rounding: this is the optimum if the predicted gain was small.
             return Minimum(theta, now, iteration, promised <= 1e-7 * now.cost)
         size = np.abs(trial)
         change = float((np.abs(move) / (size + (1e-3 * size.max() + 1e-300))).max())
@@ -122,7 +122,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
 
 
 def _free(problem: Problem, theta: Array, gradient: Array) -> Mask:
-    """Unknowns that may move: not those at a bound that the descent would cross."""
+    """Mask of the unknowns that may move: not those at a bound that the descent would cross."""
     if (theta > problem.lower).all() and (theta < problem.upper).all():
         return np.ones(theta.size, dtype=bool)
     held = ((theta <= problem.lower) & (gradient > 0)) | ((theta >= problem.upper) & (gradient < 0))
@@ -143,7 +143,7 @@ def _newton_step(now: Evaluation, free: Mask) -> Array:
 
 
 def _promised(now: Evaluation, move: Array) -> float:
-    """By how much the cost of the linear problem falls from theta to theta - ``move``."""
+    """The predicted decrease of the linearised problem's cost from theta to theta - ``move``."""
     return float(2.0 * move @ now.gradient - move @ now.normal @ move)
 
 
@@ -202,7 +202,7 @@ class _TrustRegion(_GaussNewton):
     def __init__(self, first: Evaluation) -> None:
         self.radius = np.inf
         self.scale = np.sqrt(np.maximum(first.normal.diagonal(), 1e-300))
-        self.last = first, np.zeros(first.gradient.size)  # and the full step from there
+        self.last = first, np.zeros(first.gradient.size)  # the last evaluation and the full step from there
 
     def step(self, now: Evaluation, newton: Array, free: Mask) -> Array:
         self.scale = np.sqrt(np.maximum(self.scale**2, now.normal.diagonal()))
@@ -213,7 +213,7 @@ class _TrustRegion(_GaussNewton):
         values, vectors = np.linalg.eigh(now.normal[np.ix_(free, free)] / np.outer(scale, scale))
         values = np.maximum(values, 0.0)
         along = vectors.T @ (now.gradient[free] / scale)
-        # |along/(values + mu)| falls with mu: bisection in the logarithm needs no derivative and cannot fail.
+        # |along/(values + mu)| decreases with mu: bisection needs no derivative and cannot fail.
         low, high = 0.0, float(np.linalg.norm(along)) / self.radius
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -229,12 +229,12 @@ class _TrustRegion(_GaussNewton):
         if (trial >= problem.lower).all() and (trial <= problem.upper).all():
             return trial
         on_bounds: Array = np.clip(trial, problem.lower, problem.upper)
-        if self.radius < np.inf:  # a reflection has climbed
+        if self.radius < np.inf:  # a reflected step has raised the cost before
             return on_bounds
         reflected = np.where(trial < problem.lower, 2 * problem.lower - trial, trial)
         reflected = np.where(reflected > problem.upper, 2 * problem.upper - reflected, reflected)
         reflected = np.clip(np.where(np.isfinite(reflected), reflected, trial), problem.lower, problem.upper)
-        # Of the two the one that promises more: the least may lie on a bound, and reflections from it come back.
+        # Choose the larger predicted gain: the minimum may lie on a bound, about which reflections oscillate.
         now, newton = self.last
         return max(on_bounds, reflected, key=lambda point: _promised(now, trial + newton - point))
 

@@ -14,20 +14,20 @@ from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification._prediction_error import EVERY, LARGEST_DELAY_S, PredictionError
 from smartshoe.models.first_order import as_kernels_take
 
-COARSE_STEP_S = 0.05  # the grid on which a delay is first looked for
+COARSE_STEP_S = 0.05  # step of the grid on which the delay is searched first
 
 
 def srivc(
     problem: PredictionError, *, prefilter_rad_s: float, tolerance: float, max_iterations: int, delay_s: float = 0.0
 ) -> tuple[float, float, float, Array, int, bool]:
-    """alpha, p1, p2 (see `prediction_error`), nuisances, iterations and whether they settled to ``tolerance``.
+    """alpha, p1, p2 (see `prediction_error`), nuisance parameters, iterations, and whether they reached ``tolerance``.
 
-    The nuisances (recordings, 0 to 2) are the free ones of offset and initial state, in this order.
+    The nuisance parameters (recordings, 0 to 2) are offset and initial state, as far as free, in this order.
 
-    Least squares on y' = -alpha y + beta0 u' + beta1 u behind the state-variable filter 1/(s + lambda), lambda =
-    ``prefilter_rad_s``; then the filter and the instrument (the auxiliary model's output) are renewed. A constant
-    and a decaying exponential for each recording stand for its offset and initial state. Missing outputs are filled
-    with the auxiliary model's. An unstable pole is reflected into the left half plane.
+    It starts with least squares on y' = -alpha y + beta0 u' + beta1 u behind the state-variable filter 1/(s + lambda),
+    lambda = ``prefilter_rad_s``; then the filter and the instrument (the auxiliary model's output) are updated
+    repeatedly. A constant and a decaying exponential per recording represent its offset and initial state. Missing
+    outputs are replaced by the auxiliary model's. An unstable pole is reflected into the left half plane.
     """
     from smartshoe.kernels.first_order import respond
 
@@ -46,7 +46,7 @@ def srivc(
         auxiliary, outputs = [], []
         for index, (u, y) in enumerate(zip(inputs, measured, strict=True)):
             experiment = problem.experiments[index]
-            # Offset and start stand among the instruments as they are: the auxiliary model needs neither.
+            # Offset and initial state are their own instruments: the auxiliary model needs neither.
             model = np.empty(u.size)
             respond(u, *as_kernels_take(experiment.step), 0.0, pole, p1, p2, 0.0, 0.0, model)
             auxiliary.append(model)
@@ -63,7 +63,7 @@ def _step(
     instruments: Sequence[Array],
     pole: float,
 ) -> Array:
-    """One instrumental-variable solution (alpha, beta0, beta1, nuisances)."""
+    """One instrumental-variable solution (alpha, beta0, beta1, nuisance parameters)."""
     from smartshoe.kernels.first_order import COLUMNS
     from smartshoe.kernels.srivc import INSTRUMENT, REGRESSOR, TARGET, instrument_products
 
@@ -97,7 +97,7 @@ def _step(
 
 
 def _nuisance(problem: PredictionError, index: int, alpha: float, rest: Array) -> Array:
-    """Offset and initial state of one recording, by least squares on what the model leaves."""
+    """Offset and initial state of one recording, by least squares on the model's residual."""
     experiment = problem.experiments[index]
     columns = []
     if problem.offset_at is not None:
@@ -114,9 +114,9 @@ def _nuisance(problem: PredictionError, index: int, alpha: float, rest: Array) -
 
 
 def coarse_delay(problem: PredictionError, pole: float) -> float:
-    """The delay in s, on a grid of 0.05 s, from which a gradient finds the right one.
+    """The delay in s on a grid of 0.05 s, near enough to start a gradient method.
 
-    Least squares of the output on the delayed input, its slow part and a constant: enough to tell tenths of a second.
+    Least squares of the output on the delayed input, its low-passed part and a constant.
     """
     from smartshoe.kernels.first_order import respond
     from smartshoe.kernels.srivc import delayed_products
@@ -147,6 +147,6 @@ def coarse_delay(problem: PredictionError, pole: float) -> float:
     if grid_s == 0.0 or costs.min() >= 0.5 * costs[reach]:
         return 0.0
     best = int(np.argmin(costs)) - reach
-    # In the inverse direction the input is shifted forwards to undo the reading's delay.
+    # In the inverse direction the input, a reading, is shifted forwards to compensate its delay.
     sign = 1.0 if problem.settings.direction == "inverse" else -1.0
     return sign * best * grid_s

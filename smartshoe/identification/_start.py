@@ -1,4 +1,4 @@
-"""Where the minimisation starts: SRIVC on means of neighbouring samples, or a scan of poles where that goes astray."""
+"""Finds the start of the minimisation: SRIVC on means of neighbouring samples, or a scan of poles if that fails."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from smartshoe.models.first_order import lag
 
 COARSE_SAMPLES = 2000
 COARSE_ITERATIONS = 10
-START_TOLERANCE = 1e-2  # of a coefficient: far nearer than the noise leaves it
+START_TOLERANCE = 1e-2  # relative, of a coefficient: near enough for a start
 POLES_RAD_S = np.geomspace(0.01, 300.0, 19)
-RESOLVED = 0.3  # of a pole times the coarse step: above it the pole is looked for in all samples
+RESOLVED = 0.3  # of pole times coarse step: above it, the pole is searched on all samples
 
 
 def start(problem: PredictionError, prefilter_rad_s: float) -> Array:
-    """theta from which every method finds the optimum."""
+    """A theta from which every method finds the optimum."""
     coarse = problem.coarse(COARSE_SAMPLES)
     delay_s = problem.delay_s(np.zeros(problem.size))
     if problem.delay_at is not None:
@@ -39,7 +39,7 @@ def start(problem: PredictionError, prefilter_rad_s: float) -> Array:
                 if place is not None:
                     theta[place : place + nuisances.shape[0]] = nuisances[:, column]
             return theta
-    # Data far from the model can send SRIVC astray: of a grid of poles the best is a safe start.
+    # SRIVC can fail on data far from the model: the best of a grid of poles is a safe start.
     scanned = [_linear(coarse, pole, delay_s) for pole in POLES_RAD_S]
     if settled:
         scanned.append(_linear(coarse, alpha, delay_s))
@@ -50,7 +50,7 @@ def start(problem: PredictionError, prefilter_rad_s: float) -> Array:
 def theta_at(
     problem: PredictionError, alpha: float, p1: float, p2: float, delay_s: float, *, exact: bool = False
 ) -> Array:
-    """theta at a response and a delay; what enters linearly beside them by least squares, ``exact`` or on the means."""
+    """theta at a given response and delay; linear unknowns by least squares, on all samples (``exact``) or on means."""
     theta = _response(problem, alpha, p1, p2, delay_s)
     linear = [index for index in range(problem.shape_size, problem.size) if index != problem.delay_at]
     if linear and problem.settings.noise_ratio == 0.0:
@@ -60,7 +60,7 @@ def theta_at(
 
 
 def _response(problem: PredictionError, alpha: float, p1: float, p2: float, delay_s: float) -> Array:
-    """theta at a response and a delay, the rest 0."""
+    """theta at a given response and delay, everything else 0."""
     theta = np.zeros(problem.size)
     values = coefficients_of(Shape(alpha, p1, p2, np.eye(3)), problem.settings.direction)[0]
     theta[: problem.shape_size] = problem.form.from_coefficients(*(float(value) for value in values))
@@ -71,7 +71,7 @@ def _response(problem: PredictionError, alpha: float, p1: float, p2: float, dela
 
 
 def _linear(problem: PredictionError, alpha: float, delay_s: float) -> tuple[float, float, float, float]:
-    """Cost and (alpha, p1, p2) at a given pole, all that enters linearly by least squares."""
+    """Cost and (alpha, p1, p2) at a given pole, with the linear unknowns by least squares."""
     count = len(problem.experiments)
     constant, fading = problem.offset_at is not None, problem.state_at is not None
     size = 2 + (constant + fading) * count

@@ -1,12 +1,12 @@
-"""Sufficient statistics of the first-order model for every relaxation time, and the least cost over them.
+"""Sufficient statistics of the first-order model for every relaxation time, and the minimum of the cost over them.
 
-The prediction error is linear in the input, its lag w(alpha), a constant and the fading start exp(-alpha t). Lag and
-start are analytic in ln alpha, up to pi/2 off the real axis, so that at any alpha they are, to some 1e-9, a fixed
-combination of the same at a few neighbours in a fixed bank of poles. The triangular factor of a QR
-decomposition over the bank's columns (the square-root information filter: Bierman 1977, Factorization Methods for
-Discrete Sequential Estimation, ch. IV) is therefore a sufficient statistic for every alpha: variable projection
-(Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432) on it finds the minimiser over all that was ever pushed.
-The factor rather than the normal matrix: its rounding is 1e-16 of the signal, not of the signal's square.
+The prediction error is linear in the input, its lag w(alpha), a constant and the initial transient exp(-alpha t). Lag
+and transient are analytic in ln alpha, up to pi/2 off the real axis, so that at any alpha they equal, to some 1e-9, a
+fixed combination of those at a few neighbours in a fixed bank of poles. The triangular factor of a QR decomposition
+over the bank's columns (the square-root information filter: Bierman 1977, Factorization Methods for Discrete Sequential
+Estimation, ch. IV) is therefore a sufficient statistic for every alpha. Variable projection (Golub and Pereyra 1973,
+SIAM J. Numer. Anal. 10, 413-432) on it finds the minimiser over all samples so far. The factor is used rather than the
+normal matrix because its rounding is 1e-16 of the signal, not of the signal's square.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ MOST_HALVINGS = 30
 
 LN_POLES = np.linspace(np.log(FASTEST), np.log(SLOWEST), POLES)  # fastest first: see `Sums.absorb`
 BANK = np.exp(LN_POLES)
-GRID = np.append(LN_POLES[::-2], LN_POLES[0])  # rising: where the search for the least cost begins
+GRID = np.append(LN_POLES[::-2], LN_POLES[0])  # increasing; where the search for the least cost begins
 
 
 def bank_weights(ln_alpha: float) -> tuple[Array, Array]:
     """Weights (POLES,) that interpolate the bank's columns at ``ln_alpha``, and their derivative.
 
-    Lagrange's polynomial through the nearest NEIGHBOURS poles.
+    By Lagrange's polynomial through the nearest NEIGHBOURS poles.
     """
     place = (ln_alpha - LN_POLES[0]) / (LN_POLES[1] - LN_POLES[0])
     first = int(np.clip(np.floor(place) - NEIGHBOURS // 2 + 1, 0, POLES - NEIGHBOURS))
@@ -40,7 +40,7 @@ def bank_weights(ln_alpha: float) -> tuple[Array, Array]:
     apart = nodes[:, None] - nodes + np.eye(NEIGHBOURS)
     factors = (place - first - nodes) / apart
     np.fill_diagonal(factors, 1.0)
-    # One factor of each product differentiated at a time: axis 1 says which.
+    # The product rule: axis 1 is the factor that is differentiated.
     products = np.repeat(factors[:, None, :], NEIGHBOURS, axis=1)
     own = np.arange(NEIGHBOURS)
     products[:, own, own] = 1.0 / apart
@@ -54,10 +54,10 @@ def bank_weights(ln_alpha: float) -> tuple[Array, Array]:
 
 @dataclass
 class Sums:
-    """All that is known of one experiment; its size does not depend on how long it was.
+    """The sufficient statistics of one experiment; their size does not depend on its length.
 
-    ``root`` (r, c) is upper triangular over the columns: the fading starts (fastest first), the lags, the input, the
-    constant, the output. ``lags`` (POLES,) is the bank's state after the input ``last_u`` at sample ``last_at``.
+    ``root`` (r, c) is upper triangular over the columns: the initial transients (fastest first), the lags, the input,
+    the constant, the output. ``lags`` (POLES,) is the bank's state after the input ``last_u`` at sample ``last_at``.
     """
 
     root: Array
@@ -74,7 +74,7 @@ class Sums:
     reading_ends: tuple[float, float] = (np.inf, -np.inf)
 
     def absorb(self, u: Array, y: Array, at: Integers, step_s: float, free: Columns, inverse: bool) -> None:
-        """Take in inputs (n,) at the samples ``at`` (n,); outputs (n,) are NaN where missing."""
+        """Add inputs (n,) at the samples ``at`` (n,); outputs (n,) are NaN where missing."""
         from smartshoe.kernels.pole_bank import lag_bank
 
         if not u.size:
@@ -93,7 +93,7 @@ class Sums:
         gone = 0
         if free.starts is not None:
             time_s = step_s * at
-            # Starts that have faded below rounding are 0: their rows of the factor stay as they are.
+            # Transients that have decayed below rounding are 0: their rows of the factor do not change.
             gone = int(np.count_nonzero(time_s[0] * BANK > VANISHED))
             columns[:, :gone] = 0.0
             columns[:, gone:POLES] = np.exp(-np.outer(time_s, BANK[gone:]))
@@ -125,7 +125,7 @@ class Sums:
 
 
 def pooled(one: tuple[int, float, float], other: tuple[int, float, float]) -> tuple[int, float, float]:
-    """Count, mean and sum of squares about the mean of two sets together."""
+    """Count, mean and sum of squares about the mean of two sets combined."""
     count = one[0] + other[0]
     if not count:
         return one
@@ -135,7 +135,7 @@ def pooled(one: tuple[int, float, float], other: tuple[int, float, float]) -> tu
 
 @dataclass(frozen=True)
 class Columns:
-    """Where the columns are: ``starts`` and ``constant`` None where they are not estimated."""
+    """Positions of the columns; ``starts`` and ``constant`` are None where they are not estimated."""
 
     starts: slice | None
     lags: slice
@@ -145,7 +145,7 @@ class Columns:
 
     @classmethod
     def of(cls, start: bool, constant: bool) -> Columns:
-        """The places where an initial state (``start``) and a constant are estimated, or not."""
+        """The positions for an initial state (``start``) and a constant, each estimated or not."""
         at = POLES if start else 0
         u = at + POLES
         return cls(slice(0, POLES) if start else None, slice(at, u), u, u + 1 if constant else None, u + 2 + constant)
@@ -153,7 +153,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Solved:
-    """The least cost: theta (p,), the Jacobian's triangular factor (p, p) there, the cost e'e, and the iterations."""
+    """The minimum: theta (p,), the Jacobian's triangular factor (p, p) there, the cost e'e, and the iterations."""
 
     theta: Array
     jacobian: Array
@@ -162,9 +162,9 @@ class Solved:
 
 
 class Projection:
-    """The least cost over all but ln alpha, on the experiments' triangular factors.
+    """The cost as a function of ln alpha alone, minimised over all else, from the experiments' triangular factors.
 
-    theta = (ln alpha, p1, p2), then one constant and one initial state an experiment where they are estimated.
+    theta = (ln alpha, p1, p2), then for each experiment one constant and one initial state where they are estimated.
     """
 
     def __init__(self, roots: list[Array], free: Columns) -> None:
@@ -180,7 +180,7 @@ class Projection:
         self.size = 3 + count * ((free.constant is not None) + (free.starts is not None))
 
     def _columns(self, weights: Array) -> Array:
-        """(rows, size) the derivative over theta; the first column is left 0."""
+        """(rows, size) derivative over theta; the first column is left 0."""
         columns = np.zeros((self.y.size, self.size))
         w = self.lags @ weights
         columns[:, 1], columns[:, 2] = self.u - w, w
@@ -194,7 +194,7 @@ class Projection:
         return columns
 
     def solve(self, ln_alpha: float) -> tuple[Array, Array, Array]:
-        """Theta, the error (rows,) and its derivative (rows, size) at the best of all but ``ln_alpha``."""
+        """theta, the error (rows,) and its derivative (rows, size) at ``ln_alpha`` with all else optimal."""
         weights, slopes = bank_weights(ln_alpha)
         jacobian = self._columns(weights)
         scale = np.linalg.norm(jacobian[:, 1:], axis=0)
@@ -209,14 +209,14 @@ class Projection:
         return theta, error, jacobian
 
     def slope(self, ln_alpha: float) -> float:
-        """Half the derivative of the least cost over ln alpha: the other unknowns, at their best, leave no trace."""
+        """Half the derivative of the least cost over ln alpha; the other unknowns, being optimal, do not contribute."""
         _, error, jacobian = self.solve(ln_alpha)
         return float(jacobian[:, 0] @ error)
 
     def minimise(self, where: str) -> Solved:
-        """The zero of the slope beside the best of the bank's poles; the bank's end where the cost falls towards it.
+        """The zero of the slope next to the best of the bank's poles; the bank's end where the cost falls towards it.
 
-        Raises `NotConvergedError` where no such zero is found.
+        Raises `NotConvergedError` where there is no such zero.
         """
         from scipy.optimize import brentq
 

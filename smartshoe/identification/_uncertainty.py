@@ -1,4 +1,4 @@
-"""Covariance of the estimate, and intervals by likelihood profile where the covariance is too coarse a picture."""
+"""Covariance of the estimate, and likelihood-profile intervals where the covariance is too coarse an approximation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from smartshoe.identification._solve import Evaluation, solve_normal
 from smartshoe.signals.noise import NORMAL_95
 
 PERSISTENT_CONDITION = 1e-13
-CURVED = 0.1  # of ln alpha: beyond this sd a straight line no longer describes the interval
+CURVED = 0.1  # sd of ln alpha beyond which the linear approximation is too coarse for an interval
 PROFILE_ITERATIONS = 30
 
 Function = Callable[[Array], tuple[float, Array]]
@@ -31,7 +31,7 @@ def inverse_normal(normal: Array) -> tuple[Array, bool]:
 
 def t_quantile(degrees: int) -> float:
     """The 97.5 % quantile of Student's t."""
-    if degrees > 1000:  # its expansion in 1/degrees (Abramowitz and Stegun 26.7.5) without the import of scipy.stats
+    if degrees > 1000:  # expansion in 1/degrees (Abramowitz and Stegun 26.7.5), avoiding the import of scipy.stats
         z = NORMAL_95
         return z + (z**3 + z) / (4 * degrees)
     from scipy.special import stdtrit
@@ -42,12 +42,12 @@ def t_quantile(degrees: int) -> float:
 def profile_interval(
     problem: PredictionError, theta: Array, seen: Evaluation, variance: float, quantile: float, function: Function
 ) -> tuple[float, float]:
-    """The values of ``function`` on the region cost <= least cost + quantile^2 variance: its lowest and highest.
+    """The lowest and highest value of ``function`` in the region cost <= least cost + quantile^2 variance.
 
-    The likelihood-profile interval (Venzon and Moolgavkar 1988, Applied Statistics 37, 87-94), found by the largest
-    step that the local quadratic allows, renewed until it stands on the region's border. Infinite where the border is
-    not reached. Where the search went beyond it and did not settle on it, as about a delay, whose cost is no smooth
-    function between samples, the furthest that it went, so that the interval is rather too wide.
+    The likelihood-profile interval (Venzon and Moolgavkar 1988, Applied Statistics 37, 87-94). It is found by repeating
+    the largest step that the local quadratic allows until the region's border is reached. An end is infinite where the
+    border is not reached. Where the search went beyond the border without converging to it, as for a delay, whose cost
+    is not smooth between samples, the furthest point is used, so that the interval is too wide rather than too narrow.
     """
     ends = [
         _profile_end(problem, theta, seen, seen.cost + quantile**2 * variance, function, sign) for sign in (-1.0, 1.0)
@@ -68,7 +68,7 @@ def _profile_end(
         reach = np.sqrt(max(left, 0.0) / max(float(gradient @ along), 1e-300))
         step = -centre + sign * reach * along
         longest = abs(float(step[0]))
-        if longest > 0.5:  # half a unit of ln alpha: further the quadratic is not to be trusted
+        if longest > 0.5:  # of ln alpha: the quadratic is not reliable further away
             step = step * (0.5 / longest)
         following = np.clip(at + step, problem.lower, problem.upper)
         seen_there = problem.evaluate(following)

@@ -1,9 +1,9 @@
-"""Errors in variables: the filter behind which the prediction error is white although the input is noisy as well.
+"""Errors in variables: a filter that makes the prediction error white although the input is noisy too.
 
 With white noise of variance ratio r on the input, the error G u - y has the spectrum 1 + r |G|^2 (times the output's
-variance), which first-order G makes a ratio of first-order polynomials: one pole to cancel, one zero to place. The
-least squares behind that filter are the maximum likelihood for known variances (Soderstrom 2007, Automatica 43,
-939-958; Pintelon and Schoukens 2012, ch. 9), and consistent since the filter's gain falls as G grows.
+variance). For first-order G this is a ratio of first-order polynomials: one pole to cancel, one zero to place. Least
+squares behind that filter is maximum likelihood for known variances (Soderstrom 2007, Automatica 43, 939-958; Pintelon
+and Schoukens 2012, ch. 9), and consistent since the filter's gain falls as G grows.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from smartshoe.models.first_order import hold_coefficients, hold_slopes
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """r_k = (e_k - pole e_(k-1))/deviation + zero r_(k-1), with the derivatives (k,) of the three over theta."""
+    """r_k = (e_k - pole e_(k-1))/deviation + zero r_(k-1), with the derivatives (k,) of all three over theta."""
 
     pole: float
     zero: float
@@ -31,10 +31,10 @@ class Whitening:
 
 
 def whitening(shape: Shape, slope: Array, step_s: float, ratio: float, ratio_slope: Array) -> Whitening:
-    """The filter at a response; ``slope`` (3, k) of (ln alpha, p1, p2) and ``ratio_slope`` (k,) over theta.
+    """The filter for a given response; ``slope`` (3, k) of (ln alpha, p1, p2) and ``ratio_slope`` (k,) over theta.
 
     1 + ratio |G|^2 = deviation^2 |1 - zero/z|^2/|1 - pole/z|^2: its values at z = 1 and z = -1 give both unknowns
-    without a subtraction of near numbers.
+    without subtracting nearly equal numbers.
     """
     x = shape.alpha * step_s
     pole, now, before = (float(value) for value in hold_coefficients(x))
@@ -62,12 +62,12 @@ def whitening(shape: Shape, slope: Array, step_s: float, ratio: float, ratio_slo
 
 
 def whitened(white: Whitening, error: Array) -> Array:
-    """``error`` (n,) behind the filter, from rest."""
+    """``error`` (n,) passed through the filter, starting from rest."""
     return linear_filter(np.array([1.0, -white.pole]) / white.deviation, [1.0, -white.zero], error)[0]
 
 
 def whiten(white: Whitening, error: Array, jacobian: Array) -> tuple[Array, Array]:
-    """``error`` (n,) and its derivatives ``jacobian`` (k, n) behind the filter, from rest."""
+    """``error`` (n,) and its derivatives ``jacobian`` (k, n) passed through the filter, starting from rest."""
     poles = [1.0, -white.zero]
     before = np.concatenate([[0.0], error[:-1]])
     innovation = (error - white.pole * before) / white.deviation

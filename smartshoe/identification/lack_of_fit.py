@@ -1,4 +1,4 @@
-"""Whether what a fit leaves over is noise: the F test of lack of fit against the pure error of repeated cycles."""
+"""Tests whether a fit's residual is noise: the F test of lack of fit against the pure error of repeated cycles."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from smartshoe.identification._identification import Identification
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Recording
 
-FEWEST_BLOCKS = 16  # of the shortest cycle
+FEWEST_BLOCKS = 16  # in the shortest cycle
 LEVEL = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class LackOfFitTest:
-    """``statistic`` F with ``degrees`` (lack of fit, pure error), whole numbers after allowance for autocorrelation.
+    """``statistic`` F with ``degrees`` (lack of fit, pure error), integers after correction for autocorrelation.
 
     ``repeatable_percent`` is the share of the residual's variance that repeats from cycle to cycle, of ``n_cycles``.
     """
@@ -35,7 +35,7 @@ class LackOfFitTest:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON."""
+        """The test as plain numbers for JSON."""
         return {
             "statistic": finite_or_none(self.statistic),
             "p_value": finite_or_none(self.p_value),
@@ -58,7 +58,7 @@ def lack_of_fit(
     recordings
         Recordings, paths or DataFrames.
     skip_first
-        So many cycles of each recording are left out.
+        The number of cycles at the beginning of each recording that are left out.
 
     Raises
     ------
@@ -72,12 +72,13 @@ def lack_of_fit(
 def lack_of_fit_of(
     residuals: Mapping[str, Array], recordings: Sequence[Recording], *, unknowns: int, skip_first: int = 0
 ) -> LackOfFitTest:
-    """The same of any model's residuals (n,) by recording, in the recordings' order; NaN where a sample is not counted.
+    """The test for any model's residuals (n,) by recording, in the recordings' order.
 
-    Draper and Smith 1998, *Applied Regression Analysis*, sec. 2.1: the mean square of the repeats' mean, over its
-    degrees less the model's ``unknowns``, against that of the deviations from the mean. It is taken on means over
-    blocks of a cycle, and the degrees of both are divided by 1 + 2 sum (1 - k/m) rho_k^2, rho the deviations'
-    autocorrelation, which makes a sum of m dependent squares a chi-square of the right spread (Satterthwaite 1946).
+    NaN where a sample is not counted. Draper and Smith 1998, *Applied Regression Analysis*, sec. 2.1: the mean square
+    of the repeats' mean, with the model's ``unknowns`` subtracted from its degrees of freedom, against that of the
+    deviations from the mean. It is computed on means over blocks of a cycle. The degrees of both are divided by 1 + 2
+    sum (1 - k/m) rho_k^2, rho the deviations' autocorrelation, which makes a sum of m dependent squares a chi-square of
+    the right spread (Satterthwaite 1946).
     """
     signals = list(residuals.values())
     if [signal.size for signal in signals] != [len(recording) for recording in recordings]:
@@ -130,10 +131,10 @@ def lack_of_fit_of(
 def _block_means(
     group: CycleGroup, recordings: Sequence[Recording], signals: Sequence[Array], block_s: float
 ) -> tuple[Array, Array, float]:
-    """(repeats, blocks) means and numbers of samples, and the sum of all their squares.
+    """(repeats, blocks) means and numbers of samples, and the sum of all squares of the samples.
 
-    Means, and no resampling, which would smooth the noise of one repeat more than another's. Repeats that do not
-    count for the most part are left out, then blocks that some repeat lacks.
+    Means are used rather than resampling, which would smooth the noise of some repeats more than that of others.
+    Repeats that are mostly not counted are left out, then blocks that any repeat lacks.
     """
     count = max(int((group.last_s - group.first_s) / block_s + 1e-6), 1)
     sums, counts, squares = (np.zeros((len(group.repeats), count)) for _ in range(3))
@@ -157,7 +158,7 @@ def _block_means(
 
 
 def _dependence(deviations: Sequence[Array]) -> float:
-    """1 + 2 sum (1 - k/m) rho_k^2 over the lags up to the first whose correlation is within its own noise."""
+    """1 + 2 sum (1 - k/m) rho_k^2 over the lags up to the first whose correlation is not significant."""
     longest = max(table.shape[1] for table in deviations)
     free = sum((table.shape[0] - 1) * table.shape[1] for table in deviations)
     power = sum(float((table**2).sum()) for table in deviations)
@@ -167,5 +168,5 @@ def _dependence(deviations: Sequence[Array]) -> float:
         rho = products / power if power > 0 else 0.0
         if abs(rho) < 2.0 / np.sqrt(free):
             break
-        total += 2.0 * rho**2  # the biased estimate holds a factor (1 - k/m) already
+        total += 2.0 * rho**2  # the biased estimate already contains a factor (1 - k/m)
     return total

@@ -1,4 +1,4 @@
-"""Leave-one-rate-out validation: whether the parameters, and the force, hold for a loading rate that was not fitted."""
+"""Leave-one-rate-out validation: whether parameters and force hold for a loading rate that was not fitted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOVED_SD = 5.0
 
 @dataclass(frozen=True, eq=False)
 class RateFold:
-    """What was ``found`` without the cycles of one rate; force errors in N on those cycles, and on what was fitted.
+    """The fit ``found`` without the cycles of one rate, with force errors in N on those cycles and on the fitted ones.
 
     Where `identify` refused without that rate, ``found`` is None, ``refused`` says why, and the errors are NaN.
     """
@@ -41,9 +41,9 @@ class RateFold:
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """A parameter over the folds: its ``value`` from all rates, ``lowest`` and ``highest`` without one.
+    """A parameter over the folds: its ``value`` from all rates, ``lowest`` and ``highest`` with one rate left out.
 
-    ``moved_sd`` is the largest distance from ``value`` in standard deviations of the fold; a right model stays
+    ``moved_sd`` is the largest distance from ``value`` in standard deviations of the fold; for a correct model it stays
     within 3.
     """
 
@@ -55,7 +55,7 @@ class Movement:
 
 @dataclass(frozen=True, eq=False)
 class LeaveOneRateOut:
-    """``folds`` by ascending rate, ``movements`` of a1, b0 and b1, the fit to ``everything``, one sentence."""
+    """``folds`` by ascending rate, ``movements`` of a1, b0 and b1, the fit to ``everything``, and a summary."""
 
     folds: tuple[RateFold, ...]
     movements: Mapping[str, Movement]
@@ -63,7 +63,7 @@ class LeaveOneRateOut:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON, None where one is not finite."""
+        """The result as plain numbers for JSON, None where one is not finite."""
         return {
             "folds": [
                 {
@@ -86,13 +86,13 @@ class LeaveOneRateOut:
 
 
 def leave_one_rate_out(recordings: RecordingLike | Sequence[RecordingLike], **options: Any) -> LeaveOneRateOut:
-    """Identify once without each loading rate (rates within 10 % are one); ``options`` are those of `identify`.
+    """Identify once without each loading rate (rates within 10 % count as one); ``options`` are those of `identify`.
 
-    A cycle goes out together with the rest after it. A recording of which nothing else is left goes out whole: its
-    reading at no load is then the mean over its rest before the first ramp, or the other recordings' where it has
-    none. Errors are of force: in the forward direction the reading's error behind the compensator.
-    Raises `NotIdentifiableError` where there is only one rate or each fold is refused, and what `identify` raises of
-    all recordings together.
+    A cycle is left out together with the rest after it. A recording with nothing else is left out entirely; its reading
+    at no load is then the mean over its rest before the first ramp, or that of the other recordings where it has none.
+    Errors are of force: in the forward direction the reading's error passed through the compensator. Raises
+    `NotIdentifiableError` where there is only one rate or each fold is refused, and the errors that `identify` raises
+    for all recordings together.
     """
     several = _in_one_unit(recordings_of(recordings))
     counted: Mapping[str, Mask] = dict(options.pop("counted", None) or {})
@@ -142,7 +142,7 @@ def leave_one_rate_out(recordings: RecordingLike | Sequence[RecordingLike], **op
 
 
 def _in_one_unit(recordings: Sequence[Recording]) -> list[Recording]:
-    """Readings in the first recording's unit, which must not change as that one is left out."""
+    """The recordings with readings in the first one's unit, so that leaving that one out does not change the unit."""
     same = []
     for recording in recordings:
         sensor, unit = recording.sensor, recordings[0].sensor.unit
@@ -154,7 +154,7 @@ def _in_one_unit(recordings: Sequence[Recording]) -> list[Recording]:
 
 
 def _span_of(experiment: Experiment, found: list[loading.Cycle], members: set[int]) -> Mask:
-    """(n,) the samples of the cycles in ``members``, each up to the next cycle."""
+    """(n,) mask of the samples of the cycles in ``members``, each up to the next cycle."""
     span = np.zeros(experiment.time_s.size, dtype=bool)
     stops = [cycle.start for cycle in found[1:]] + [span.size]
     for cycle, stop in zip(found, stops, strict=True):
@@ -174,14 +174,14 @@ def _fold(
     options: Mapping[str, Any],
 ) -> RateFold:
     whole = [bool(found) and all(id(cycle) in members for cycle in found) for found in cycles]
-    # Names as `identify` will know them: unique over all recordings, with some of these gone.
+    # Names as `identify` will use them: made unique over all recordings before some are left out.
     named = [replace(one, name=experiment.name) for one, experiment in zip(recordings, experiments, strict=True)]
     others = [index for index, gone in enumerate(whole) if not gone]
     masks = {experiments[index].name: experiments[index].mask & ~left_out[index] for index in others}
     try:
         found = identify([named[index] for index in others], counted=masks, **options)
     except (NotIdentifiableError, NotConvergedError) as refusal:
-        # One rate on which everything hangs is a finding, and the other folds stand.
+        # That identification depends on one rate is a result in itself; the other folds remain valid.
         return RateFold(rate, count, None, *(4 * (float("nan"),)), refused=str(refusal))
     outside: list[Array] = []
     inside: list[Array] = []
@@ -197,7 +197,7 @@ def _fold(
 
 
 def _figures(errors: Sequence[Array]) -> tuple[float, float]:
-    """Root mean square and largest absolute value; NaN where there is no sample."""
+    """Root mean square and largest absolute value; NaN where there are no samples."""
     error = np.concatenate(errors)
     if not error.size:
         return float("nan"), float("nan")
@@ -205,7 +205,7 @@ def _figures(errors: Sequence[Array]) -> tuple[float, float]:
 
 
 def _compensated(found: Identification, reading: Array, experiment: Experiment) -> Array:
-    """(n,) force of a reading about its zero: (b0 s + b1)/(s + a1), started in steady state."""
+    """(n,) force of a reading relative to its zero: (b0 s + b1)/(s + a1), started in steady state."""
     a1, b0, b1 = found.coefficients
     slow = lag(reading, a1, experiment.step)
     force_n: Array = b0 * (reading - slow) + b1 / a1 * slow
@@ -213,15 +213,15 @@ def _compensated(found: Identification, reading: Array, experiment: Experiment) 
 
 
 def _force_error(found: Identification, experiment: Experiment, error: Array) -> Array:
-    """The model's error (n,) as force, model minus measured."""
+    """The model's error (n,) converted to force, model minus measured."""
     if found.direction == "inverse":
         return error
-    # Of reading = force/G the force estimate is G reading, so that G times the reading's error is its own, reversed.
+    # For reading = force/G the force estimate is G reading: its error is minus G times the reading's error.
     return -_compensated(found, error, experiment)
 
 
 def _error_of_unseen(found: Identification, experiment: Experiment, first_ramp: int) -> Array:
-    """Force error (n,) of a recording that no part of the fit has seen."""
+    """Force error (n,) of a recording that the fit did not use at all."""
     a1, _, b1 = found.coefficients
     load_zero_n = float(np.mean([one.value for one in found.load_offsets.values()]))
     rest = experiment.mask.copy()
@@ -231,7 +231,7 @@ def _error_of_unseen(found: Identification, experiment: Experiment, first_ramp: 
         offset = float(np.mean(experiment.reading[rest] - (experiment.load_n[rest] - load_zero_n) * a1 / b1))
     reading, _ = shifted(experiment.reading - offset, experiment.time_s, experiment.step, found.delay_s.value)
     if rest.any():
-        # The filter starts from its first sample, which must not be one sample's noise.
+        # The filter starts from its first value, which should not carry the noise of a single sample.
         reading[0] = float(np.mean(reading[rest]))
     error: Array = _compensated(found, reading, experiment) + load_zero_n - experiment.load_n
     return error

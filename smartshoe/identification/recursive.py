@@ -1,4 +1,4 @@
-"""`RecursiveIdentification`: the estimate of `identify` from a stream, without keeping the samples."""
+"""`RecursiveIdentification`: the estimate of `identify` from a stream, without storing the samples."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models import Parameter
 from smartshoe.units import Unit, declared, find_unit
 
-BLOCK = 1024  # samples a triangular update takes at once
+BLOCK = 1024  # samples per triangular update
 
 
 @dataclass
 class _Experiment:
-    """An experiment under way: what is absorbed, and up to a block of samples that is not yet."""
+    """An experiment in progress: the absorbed samples, and up to a block of pending ones."""
 
     name: str
     sums: Sums
@@ -39,12 +39,12 @@ class _Experiment:
 
 @dataclass(frozen=True, eq=False)
 class RecursiveEstimate:
-    """What the stream has said so far; the names are those of `Identification`.
+    """The estimate from the stream so far; names are those of `Identification`.
 
     ``parameters`` a1, b0, b1, k1, k2, c of Chinimilli 2016 (13) and (2), ``covariance`` (6, 6) in their order,
     linearised at the optimum; ``offsets`` by experiment the reading at no load, ``initial_states`` the coefficient of
-    the fading start; ``rmse`` in ``rmse_unit``; ``n_samples`` counted, ``n_missing`` not; ``iterations`` is how often
-    the cost was evaluated.
+    the decaying initial transient; ``rmse`` in ``rmse_unit``; ``n_samples`` counted and ``n_missing`` samples;
+    ``iterations`` is the number of evaluations of the cost.
     """
 
     unit: str
@@ -73,10 +73,10 @@ class RecursiveIdentification:
     """The output-error estimate of `identify` with a fixed delay, from samples at an even rate as they arrive.
 
     ``direction``, ``offset``, ``initial_state`` and ``scale`` (N per reading unit of the paper's force) are as in
-    `identify`; ``unit`` names the sensing unit. ``delay_s`` is 0: the interpolation that undoes a delay reaches
-    into the future, and its best value would have to be known before the first sample is absorbed. Take it from
-    `identify` on a whole recording and shift the stream by it before it is pushed. Nothing is ever forgotten.
-    Relaxation between 0.003 and 300 1/s can be found.
+    `identify`; ``unit`` names the sensing unit. ``delay_s`` is 0: the interpolation that compensates a delay needs
+    future samples, and its best value would have to be known before the first sample is absorbed. Take the delay from
+    `identify` on a whole recording and shift the stream by it before pushing. All samples keep their weight. Relaxation
+    rates between 0.003 and 300 1/s can be found.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class RecursiveIdentification:
 
     @property
     def state_bytes(self) -> int:
-        """Memory of what is remembered: it grows with the number of experiments, not with that of samples."""
+        """Memory of the stored state in bytes: it grows with the number of experiments, not of samples."""
         own = self._open
         arrays = [own.u, own.y, own.at, own.sums.root, own.sums.lags]
         arrays += [array for _, sums in self._closed for array in (sums.root, sums.lags)]
@@ -124,7 +124,7 @@ class RecursiveIdentification:
 
     @on_one_thread
     def start_experiment(self, name: str) -> None:
-        """What follows is another recording, with an offset and a start of its own."""
+        """Begin another recording, with its own offset and initial state."""
         if any(name == known for known, _ in self._closed) or (self._open.seen and name == self._open.name):
             raise UsageError(f"there is an experiment {name!r} already: give another name")
         if self._open.seen:
@@ -133,10 +133,10 @@ class RecursiveIdentification:
 
     @on_one_thread
     def push(self, force_n: ArrayLike, reading: ArrayLike) -> None:
-        """Take in loads in N and readings, floats or blocks (n,); what is not finite is missing.
+        """Add loads in N and readings, numbers or blocks (n,); values that are not finite are missing.
 
-        A missing input lies on the line between its neighbours; a sample counts where both are there. How the stream
-        is cut into blocks makes no difference, to the last digit.
+        A missing input is interpolated linearly between its neighbours; a sample counts where both values are present.
+        How the stream is divided into blocks makes no difference, to the last digit.
         """
         load = np.atleast_1d(np.asarray(force_n, dtype=float))
         pressure = np.atleast_1d(np.asarray(reading, dtype=float))
@@ -152,7 +152,7 @@ class RecursiveIdentification:
         u, y = (pressure, load) if self._inverse else (load, pressure)
         at = own.seen + np.arange(u.size)
         own.seen += u.size
-        # The hold across a missing input is one long straight line: nothing need be stored until the next is there.
+        # A missing input lies on one straight line: nothing is stored until the next input arrives.
         present = np.isfinite(u)
         if not present.all():
             u, y, at = u[present], y[present], at[present]
@@ -172,7 +172,7 @@ class RecursiveIdentification:
         sums.absorb(own.u[:n], own.y[:n], own.at[:n], 1.0 / self.sample_rate_hz, self._columns, self._inverse)
 
     def _sums_now(self) -> Sums:
-        """The open experiment's sums with all of its samples; those kept are left as they are."""
+        """The open experiment's sums over all of its samples; the stored ones are not changed."""
         sums = replace(self._open.sums, lags=self._open.sums.lags.copy())
         self._absorb(sums, self._open)
         return sums
@@ -181,8 +181,8 @@ class RecursiveIdentification:
     def estimate(self) -> RecursiveEstimate:
         """The minimiser over all samples so far.
 
-        Raises `NotIdentifiableError`, naming what is missing, while the data cannot hold the answer, and
-        `NotConvergedError` where the cost has no least value to be found.
+        Raises `NotIdentifiableError`, naming the reason, while the data cannot determine the parameters, and
+        `NotConvergedError` where no minimum of the cost is found.
         """
         experiments = [
             (name, sums) for name, sums in [*self._closed, (self._open.name, self._sums_now())] if sums.count
@@ -247,11 +247,11 @@ class RecursiveIdentification:
         )
 
     def compensator(self, sample_rate_hz: float | None = None) -> Compensator:
-        """The filter of the estimate so far, at the stream's rate unless another is given; raises as `estimate`."""
+        """The filter of the current estimate, by default at the stream's rate; raises as `estimate`."""
         return self.estimate().compensator(sample_rate_hz or self.sample_rate_hz)
 
     def _offsets(self, names: list[str], theta: Array, full: Array, quantile: float) -> dict[str, Parameter]:
-        """The reading at no load: the free constant, by way of the static gain where it stands at the load."""
+        """By experiment, the reading at no load: the free constant, converted by the static gain if it is a load."""
         symbol = self.reading_unit.symbol
         if self._offset is not None:
             return {name: Parameter.from_sd(self._offset, 0.0, symbol) for name in names}

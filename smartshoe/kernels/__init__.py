@@ -1,1 +1,1 @@
-"""Compiled passes over the data, and nothing else: what is fitted or filtered is decided above."""
+"""Compiled passes over the data, without decisions: the calling packages choose what is fitted or filtered."""

@@ -1,4 +1,4 @@
-"""Processes that need the same kernels at once: one compiles each, the others take it from the disk."""
+"""Processes that need the same kernels at once: one compiles each kernel, the others load it from the disk."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from typing import Any
 
 
 def compile_each_kernel_once() -> None:
-    """Make numba, in this process, wait while another one that does the same compiles a kernel of the same file.
+    """Make numba in this process wait while another process compiles a kernel of the same file.
 
-    numba looks on the disk before it compiles, but two that begin at once both compile. Modules import in one
-    direction, so that no two processes wait for each other; numba's own lock comes first, so that no two threads do.
+    numba looks on the disk before it compiles, but two processes that begin at once would both compile. There is no
+    deadlock: modules import in one direction, so no two processes wait for each other, and numba's own lock is taken
+    first, so no two threads do.
     """
     try:
         import fcntl
-    except ImportError:  # no such locks on Windows
+    except ImportError:  # Windows lacks these locks
         return
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher

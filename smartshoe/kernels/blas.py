@@ -1,4 +1,4 @@
-"""Small matrices on one thread: a pool of threads costs more than their product."""
+"""Runs products of small matrices on one thread, since a thread pool costs more than the product."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ R = TypeVar("R")
 
 @cache
 def _controller(with_scipy: bool) -> Any:
-    """The BLAS libraries loaded; looked for anew once SciPy has brought its own, since the search takes long."""
+    """The loaded BLAS libraries; searched again only once SciPy has loaded its own, since the search is slow."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
 
 
 def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
-    """Run ``function`` with the BLAS libraries held to one thread."""
+    """Decorate ``function`` to run with the BLAS libraries limited to one thread."""
 
     @wraps(function)
     def held(*args: P.args, **kwargs: P.kwargs) -> R:

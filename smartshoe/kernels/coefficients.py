@@ -1,4 +1,4 @@
-"""The three coefficients of one experiment, start to end without a return to Python: for banks of many fits."""
+"""Fits the three coefficients of one experiment without returning to Python, for banks of many fits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from smartshoe.kernels.srivc import INSTRUMENT, REGRESSOR, TARGET, instrument_pr
 
 @njit(cache=True)
 def _solve3(matrix, right, out):  # type: ignore[no-untyped-def]
-    """Cramer's rule on the first three rows and columns; False where they are singular."""
+    """Solve the leading 3 by 3 system by Cramer's rule into ``out``; False where it is singular."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 0], matrix[1, 1], matrix[1, 2]
     g, h, i = matrix[2, 0], matrix[2, 1], matrix[2, 2]
@@ -30,7 +30,7 @@ def _solve3(matrix, right, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _start(u, y, step, pole, theta):  # type: ignore[no-untyped-def]
-    """SRIVC (Chinimilli 2016, Section V) of ``u`` and ``y``, into theta = (ln alpha, p1, p2); False if astray."""
+    """SRIVC (Chinimilli 2016, Section V) of ``u`` and ``y`` into theta = (ln alpha, p1, p2); False if it fails."""
     every = np.empty(0, dtype=np.bool_)
     products, normal, right, solution = np.empty((COLUMNS, COLUMNS)), np.empty((3, 3)), np.empty(3), np.empty(3)
     instrument = y.copy()
@@ -55,10 +55,10 @@ def _start(u, y, step, pole, theta):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[no-untyped-def]
-    """Gauss-Newton from SRIVC; returns cost, passes over the data, and whether it settled.
+    """Gauss-Newton from SRIVC; returns cost, passes over the data, and whether it converged.
 
-    ``u``, ``y`` (n,) input and output ``step`` s apart, no offset, no delay, steady before; ``pole`` SRIVC's first
-    lambda, on means of ``factor`` samples. ``theta`` (3,) becomes (ln alpha, p1, p2), ``normal`` (3, 3) J'J.
+    ``u``, ``y`` (n,) are input and output ``step`` s apart, without offset or delay, steady before; ``pole`` is SRIVC's
+    first lambda, on means of ``factor`` samples. ``theta`` (3,) becomes (ln alpha, p1, p2), ``normal`` (3, 3) J'J.
     """
     none, stored = np.empty(0), np.empty((0, 0))
     every = np.empty(0, dtype=np.bool_)
@@ -105,7 +105,7 @@ def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[n
             change[i] /= math.sqrt(normal[i, i])
             theta[i] -= change[i]
             relative = max(relative, abs(change[i]) / (abs(theta[i]) + 1e-300))
-        # A step of a hundred-thousandth of a standard error is worth taking, another look at the data is not.
+        # A step of 1e-5 standard errors is worth taking, but not another pass over the data.
         if promised <= 1e-10 * cost / u.size or relative < 1e-12:
             return cost, passes, True
     return cost, passes, False

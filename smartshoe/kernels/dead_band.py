@@ -1,4 +1,4 @@
-"""Gaps that a load closes first, undone; the plain twin is `smartshoe.models.effects.dead_band`."""
+"""Inverse of gaps that a load closes first; the plain twin is `smartshoe.models.effects.dead_band`."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from smartshoe.kernels.memory import SOLVED, STEPS, closer
 
 @njit(cache=True)
 def dead_band_undone(signal, lost, soft, onset, sets_in_over, begins, whole, late, most, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out - lost m(out/lost) = ``signal`` (n,), m as in `DeadBand`; what is not above zero stays.
+    """out (n,) with out - lost m(out/lost) = ``signal`` (n,), m as in `DeadBand`; samples not above zero are unchanged.
 
-    ``begins``, ``whole`` and ``late`` are m's constants, ``sets_in_over`` its onset or hardly any, ``most`` more than
-    is lost.
+    ``begins``, ``whole`` and ``late`` are m's constants; ``sets_in_over`` is its onset or a tiny number; ``most`` is an
+    upper bound of the lost load.
     """
     for k in range(signal.size):
         y = signal[k]

@@ -1,4 +1,4 @@
-"""What grew with the dose of load undone: sets are taken off, gains divided by, while the load is found that did it."""
+"""Inverse of effects that grow with the dose of load (sets, gains), while recovering the load that caused them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smartshoe.kernels.memory import NO_LOAD
 
 @njit(cache=True)
 def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out + set = ``signal`` (n,), set += half (out^m + last out^m) a step, out^m = 0 below zero.
+    """out (n,) with out + set = ``signal`` (n,); per step, set += half (out^m + last out^m), with out^m = 0 below zero.
 
     ``state`` (2,): set, last out^m (negative before the first sample).
     """
@@ -21,7 +21,7 @@ def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-d
         if last >= 0.0:
             known = p - total - half * last
             p = known
-            for _ in range(12):  # a contraction: half is far below 1
+            for _ in range(12):  # converges, as half is far below 1
                 p = known - half * max(p, 0.0) ** exponent
             total = signal[k] - p
         last = max(p, 0.0) ** exponent
@@ -33,9 +33,9 @@ def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-d
 def dose_undone(signal, is_gain, size, early, held, by_stroke, exponent, width, rounds, settled, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out + g = ``signal`` (n,), or out (1 + g) where ``is_gain``; g = size early log(1 + X/early).
 
-    X grows by ``held`` times the sum of two flows, p^m, a step, and where the play of ``width`` rises by ``by_stroke``
-    times the rise of its z^m, all zero below zero. Each sample is sought in at most ``rounds``, until one moves it by
-    no more than ``settled``. ``state`` (3,): X, last flow, play (NO_LOAD before the first).
+    Per step, the dose X grows by ``held`` times the sum of two flows p^m, and while the play of ``width`` rises by
+    ``by_stroke`` times the rise of its z^m; all are zero below zero. Each sample is iterated for at most ``rounds``,
+    until it changes by no more than ``settled``. ``state`` (3,): X, last flow, play (NO_LOAD before the first).
     """
     total, last, place = state
     for k in range(signal.size):
@@ -44,7 +44,7 @@ def dose_undone(signal, is_gain, size, early, held, by_stroke, exponent, width, 
         if place < NO_LOAD:
             low = max(place, 0.0)
             begun, more = low**exponent, 0.0
-            for _ in range(rounds):  # a contraction: what a step adds grows by less than the step
+            for _ in range(rounds):  # converges, as g changes by less than out does
                 guess = p
                 flow = max(p, 0.0) ** exponent
                 more = held * (last + flow)

@@ -1,6 +1,6 @@
 """One pass over an experiment: error and gradient of the first-order model, stored only as their inner products.
 
-The slow twin, with which the tests compare, is `smartshoe.identification._prediction_error`.
+The slow twin, which the tests compare with, is `smartshoe.identification._prediction_error`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from numba import njit
 
 CHUNK = 256  # samples whose columns stay in the first-level cache
 COLUMNS = 7  # d/d ln alpha, d/d p1, d/d p2, d/d delay, d/d offset, d/d start, error
-FADED = 1e-30  # of a start: below it nothing is left, and numbers would become subnormal, which are slow
-_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
+FADED = 1e-30  # of an initial state: set to 0 below this, before slow subnormal numbers arise
+_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; NaN is still handled
 _SMALL = 1e-3
 
 
@@ -35,7 +35,7 @@ def hold(alpha, step):  # type: ignore[no-untyped-def]
 def recur(E, dE, w, v, s, lag, drift, slow, m):  # type: ignore[no-untyped-def]
     """w_j = E w_(j-1) + lag_j, v_j = E v_(j-1) + dE w_(j-1) + drift_j, s_j = E s_(j-1) + slow_j for ``m`` samples.
 
-    In place of the drives, and four samples at a time, so that one need not wait for the other.
+    The results replace the drives. Four samples are handled at a time, so that they need not wait for each other.
     """
     E2 = E * E
     E3, E4 = E2 * E, E2 * E2
@@ -69,9 +69,9 @@ def recur(E, dE, w, v, s, lag, drift, slow, m):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=_LAX)
 def add_products(columns, m, out):  # type: ignore[no-untyped-def]
-    """Add the inner products of the ``m`` first samples of ``columns`` to ``out`` (COLUMNS, COLUMNS).
+    """Add the inner products of the first ``m`` samples of ``columns`` to ``out`` (COLUMNS, COLUMNS).
 
-    Written out, since 28 sums stay in registers: each sample is read once, which is four times as fast as pairs.
+    Written out, since 28 sums fit in registers: each sample is read once, four times as fast as by pairs.
     """
     a, b, c, d = columns[0], columns[1], columns[2], columns[3]
     e, f, g = columns[4], columns[5], columns[6]
@@ -102,7 +102,7 @@ def add_products(columns, m, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def copy(values, at, m, out):  # type: ignore[no-untyped-def]
-    """``m`` of ``values`` from ``at`` on into ``out``; a slice set to a slice takes numba two seconds to compile."""
+    """Copy ``m`` of ``values`` from ``at`` on into ``out``; numba takes two seconds to compile a slice assignment."""
     for j in range(m):
         out[j] = values[at + j]
 
@@ -121,11 +121,11 @@ def leave_out(counted, columns, m):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=_LAX)
 def complete(columns, now, now_change, now_s, target, alpha, p1, p2, offset, start, m):  # type: ignore[no-untyped-def]
-    """The first ``m`` of gradient and error into ``columns`` from the lags that stand there; see `inner_products`."""
+    """Compute the first ``m`` of gradient and error in ``columns`` from the lags stored there; see `inner_products`."""
     drift, rest, lag, slow = columns[0], columns[1], columns[2], columns[3]
     ones, fading, error = columns[4], columns[5], columns[6]
     drop = p2 - p1
-    # One short loop a column: LLVM turns none into vector instructions that touches more than a few arrays.
+    # One short loop per column: LLVM does not vectorise loops over more than a few arrays.
     for j in range(m):
         drift[j] = alpha * (drop * drift[j] - start * now_s[j] * fading[j])
     for j in range(m):
@@ -152,7 +152,7 @@ def inner_products(  # type: ignore[no-untyped-def]
     delayed, masked = slope.size > 0, counted.size > 0
     columns = np.empty((COLUMNS, CHUNK))
     fades, times, now_s = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK)
-    inputs, changes = np.zeros(CHUNK + 1), np.zeros(CHUNK + 1)  # the sample before the chunk, then the chunk
+    inputs, changes = np.zeros(CHUNK + 1), np.zeros(CHUNK + 1)  # the chunk, preceded by the sample before it
     before, now, before_change, now_change = inputs[:CHUNK], inputs[1:], changes[:CHUNK], changes[1:]
     drift, lag, slow, fading = columns[0], columns[2], columns[3], columns[5]
     E, A, B, dE, dA, dB = hold(alpha, step_s)
@@ -169,7 +169,7 @@ def inner_products(  # type: ignore[no-untyped-def]
         if at == 0:  # started in the steady state of the first sample
             inputs[0] = w = now[0]
             changes[0] = s = now_change[0]
-        if uneven is None:  # one short loop a column, as in `complete`
+        if uneven is None:  # one short loop per column, as in `complete`
             for j in range(m):
                 lag[j] = A * now[j] + B * before[j]
                 drift[j] = dA * now[j] + dB * before[j]

@@ -1,4 +1,4 @@
-"""The load that a linear network of wall and gas was under, from its pressure; compiled when imported."""
+"""Load from the pressure of a linear network of wall and gas; compiled on import."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LINE = "float64[::1]"
 def unload(pressure, transition, drive, read, direct, state, load):  # type: ignore[no-untyped-def]
     """load_k = (pressure_k - read . s_k)/direct, s_(k+1) = transition s_k + drive load_k, into ``load`` (n,).
 
-    ``transition`` (m, m), ``drive``, ``read`` (m,). ``state`` (m,) holds s and moves on, so that pushing block by
+    ``transition`` (m, m), ``drive``, ``read`` (m,). ``state`` (m,) holds s and is updated, so that pushing block by
     block gives the same numbers.
     """
     m = state.size

@@ -1,4 +1,4 @@
-"""A linear filter over a signal, as `scipy.signal.lfilter`: importing scipy.signal takes longer than a calibration."""
+"""A linear filter like `scipy.signal.lfilter`, whose import would take longer than a calibration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smartshoe.arrays import Array
 
 @njit(cache=True)
 def run(numerator, denominator, values, state, out):  # type: ignore[no-untyped-def]
-    """Direct form II transposed; ``state`` (order,) is what the past left and is moved on."""
+    """Filter in transposed direct form II; ``state`` (order,) is the initial state and is updated."""
     order = state.size
     if order == 1:
         b0, b1, a1, z = numerator[0], numerator[1], denominator[1], state[0]
@@ -36,17 +36,17 @@ def run(numerator, denominator, values, state, out):  # type: ignore[no-untyped-
 def linear_filter(
     numerator: ArrayLike, denominator: ArrayLike, values: Array, state: ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """``values`` (n,) through numerator/denominator (in z to the minus k, constant first), and the state it leaves.
+    """``values`` (n,) filtered by numerator/denominator (in powers z^-k, constant first), and the final state.
 
-    ``state`` (order,) is what came before, nothing (zeros) where it is not given: `scipy.signal.lfilter`'s ``zi``.
-    The numbers are lfilter's, bit for bit.
+    ``state`` (order,) is the initial state, by default zeros: `scipy.signal.lfilter`'s ``zi``. The results equal
+    lfilter's, bit for bit.
     """
     b, a = np.array(numerator, dtype=float), np.array(denominator, dtype=float)
     if b.size != a.size or a[0] != 1.0:
         size = max(b.size, a.size)
         b, a = np.append(b, np.zeros(size - b.size)) / a[0], np.append(a, np.zeros(size - a.size)) / a[0]
     left = np.zeros(b.size - 1) if state is None else np.array(state, dtype=float)
-    given = np.array(values, dtype=float)  # a writeable copy: numba compiles anew for read-only arrays
+    given = np.array(values, dtype=float)  # a writeable copy: numba would compile again for read-only arrays
     out = np.empty(given.size)
     run(b, a, given, left, out)
     return out, left

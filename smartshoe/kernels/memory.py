@@ -1,7 +1,7 @@
-"""Operators with memory of a load's past: plays, Bouc-Wen, largest so far, cycles done, air lost through an orifice.
+"""Operators with memory of past loads: plays, Bouc-Wen, largest load so far, completed cycles, air lost by an orifice.
 
-Rate-independent ones see a sequence of loads only, so that they do not care for the sampling as long as every turning
-point is a sample. The states are arrays that a call changes in place: pushing block by block gives the same numbers.
+Rate-independent ones depend on the sequence of loads only, and not on the sampling as long as every turning point is a
+sample. The states are arrays that a call changes in place: pushing block by block gives the same numbers.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ import math
 import numpy as np
 from numba import njit
 
-_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
+_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; NaN is still handled
 _BISECTIONS = 50
-SOLVED = 1e-14  # of full scale: what an inverse may leave of its equation
-STEPS, CLOSE = 60, 1e-9  # of Newton's and the like; a step of Newton's that is less leaves about its square
-EASED = 1e-3  # of the width: within it the corner of a root is rounded
-NO_LOAD = 1e30  # stands for a load before the first one
-CYCLE_ENDS = 0.05  # of the cycle's height
+SOLVED = 1e-14  # of full scale: tolerated residual of an inverse's equation
+STEPS, CLOSE = 60, 1e-9  # of Newton's and similar methods; after a smaller Newton step the error is about its square
+EASED = 1e-3  # of the width within which the corner of a root is rounded
+NO_LOAD = 1e30  # marks that there was no load yet
+CYCLE_ENDS = 0.05  # of the cycle's height, above its trough
 
 
 @njit(cache=True)
 def backlash(load, half_width, state, out):  # type: ignore[no-untyped-def]
     """Play operator: out (n,) stays within ``half_width`` of ``load`` (n,) and moves only where it must.
 
-    ``state`` (1,) is the last output, NO_LOAD before the first sample (which it then takes over).
+    ``state`` (1,) is the last output, NO_LOAD before the first sample, whose load then becomes the output.
     """
     if load.size == 0:
         return
@@ -41,7 +41,7 @@ def backlash(load, half_width, state, out):  # type: ignore[no-untyped-def]
 def plays(signal, before, own, half_widths, weights, after, state, out):  # type: ignore[no-untyped-def]
     """Prandtl-Ishlinskii: out (n,) = own x + sum of weights play(x) + after, with x = ``signal`` (n,) + before.
 
-    ``half_widths``, ``weights``, ``state`` (m,); ``state`` holds the plays' places and moves on.
+    ``half_widths``, ``weights``, ``state`` (m,); ``state`` holds the plays' positions and is updated.
     """
     for k in range(signal.size):
         x = signal[k] + before
@@ -55,7 +55,7 @@ def plays(signal, before, own, half_widths, weights, after, state, out):  # type
 
 @njit(cache=True, fastmath=_LAX)
 def _loop_at(load, half_widths, closed, open_, levelling, state):  # type: ignore[no-untyped-def]
-    """The loop at ``load``, to which ``state`` moves; see `relays`."""
+    """The loop's value at ``load``; updates ``state``; see `relays`."""
     bent = 2.0 / 3.0 * levelling
     total = 0.0
     above = load * load * (1.0 - bent * load)
@@ -74,8 +74,8 @@ def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ig
     """out (n,): loop of a bank of relays about its mean curve, positive while loading.
 
     ``closed`` (m,) weighs relays whose down thresholds b >= 0 have the density 2 b (1 - levelling b), so that all are
-    down without load; ``open_`` (m,) stop operators, in the middle before the first loading. ``state`` (m,) is the
-    play's place less its half width, -half_widths in the beginning.
+    down without load; ``open_`` (m,) weighs stop operators, which are in the middle before the first loading. ``state``
+    (m,) is the play's position minus its half width, initially -half_widths.
     """
     for k in range(load.size):
         out[k] = _loop_at(max(load[k], 0.0), half_widths, closed, open_, levelling, state)
@@ -83,11 +83,12 @@ def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ig
 
 @njit(cache=True)
 def closer(step, at, left, low, high, under, over, stays):  # type: ignore[no-untyped-def]
-    """Where the zero of a rising ``left`` is sought after ``at``, and its bracket. First the ends, ``low``, ``high``.
+    """Next point in the search for the zero of an increasing ``left``, after ``at``, and the updated bracket.
 
-    From ``step`` 2 on by the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counts
-    half. ``under`` and ``over`` are what is left at the ends; ``stays``: 1 if ``high`` stayed, -1 if ``low`` did. In C
-    `smartshoe.models.effects._false_position`.
+    The first two steps evaluate the ends ``low`` and ``high``. From ``step`` 2 on the Illinois method is used (Dowell
+    and Jarratt 1971): false position, in which an end that stays twice counts half. ``under`` and ``over`` are the
+    values at the ends; ``stays`` is 1 if ``high`` stayed, -1 if ``low`` did. `smartshoe.models.effects._false_position`
+    is the same in C.
     """
     if step == 0:
         return high, low, high, left, over, stays
@@ -103,7 +104,7 @@ def closer(step, at, left, low, high, under, over, stays):  # type: ignore[no-un
 
 @njit(cache=True)
 def relays_undone(signal, strength, half_widths, closed, open_, levelling, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out - strength relays(out) = ``signal`` (n,); ``state`` moves on."""
+    """out (n,) with out - strength relays(out) = ``signal`` (n,); ``state`` is updated."""
     moved = np.empty(half_widths.size)
     for k in range(signal.size):
         y = signal[k]
@@ -128,7 +129,7 @@ def _bend(z, exponent, turn):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def bouc_wen_branch(exponent, turn, spacing, z, slope):  # type: ignore[no-untyped-def]
-    """The rising branch from z = -1: ``z`` and ``slope`` times spacing (m,), ``spacing`` widths apart.
+    """The rising branch from z = -1: fills ``z`` and ``slope`` times spacing (m,), at points ``spacing`` widths apart.
 
     dz/dx = 1 - z^exponent, or 1 + turn |z|^exponent below zero, by fourth-order Runge-Kutta.
     """
@@ -145,7 +146,7 @@ def bouc_wen_branch(exponent, turn, spacing, z, slope):  # type: ignore[no-untyp
 
 @njit(cache=True)
 def _along(place, z, slope):  # type: ignore[no-untyped-def]
-    """The branch at ``place`` spacings from its beginning (cubic Hermite), the last value beyond its end."""
+    """The branch at ``place`` spacings from its beginning (cubic Hermite); beyond its end the last value."""
     if place >= z.size - 1:
         return z[z.size - 1]
     i = int(place)
@@ -156,7 +157,7 @@ def _along(place, z, slope):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _place_of(value, z, slope):  # type: ignore[no-untyped-def]
-    """Where the rising branch has ``value``, in spacings, by bisection; where the ends of a piece tell, by these."""
+    """The place, in spacings, where the rising branch has ``value``, by bisection of the table and of its cubics."""
     low, high = 0.0, z.size - 1.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
@@ -191,7 +192,7 @@ def bouc_wen(load, per_load, z, slope, state, out):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def _left(fading, load):  # type: ignore[no-untyped-def]
-    """The share of friction that is left under a ``load``."""
+    """The share of friction that remains under a ``load``."""
     return min(max(1.0 - fading * load, 0.0), 1.0)
 
 
@@ -209,12 +210,12 @@ def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, sta
             out[k] = y
             continue
         f = y + strength * _left(fading, last) * value
-        if abs(f - last) > dead_zone:  # else the load has not moved, as far as friction knows
+        if abs(f - last) > dead_zone:  # else the load has not moved as seen by friction
             sense = 1.0 if f > last else -1.0
             on = place if sense == direction else _place_of(sense * value, z, slope)
             low, under, over, stays = 0.0, dead_zone - sense * (f - last), 0.0, 0
-            move = high = sense * (y - last) + strength - dead_zone  # friction is no more than that
-            for i in range(1, STEPS + 1):  # what is left at the lower end is known
+            move = high = sense * (y - last) + strength - dead_zone  # an upper bound, as friction is bounded
+            for i in range(1, STEPS + 1):  # the residual at the lower end is known
                 f = last + sense * (dead_zone + move)
                 height = strength * _left(fading, last + sense * move)
                 left = sense * (f - y) - height * _along(on + move * per_load, z, slope)
@@ -231,7 +232,7 @@ def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, sta
 
 @njit(cache=True)
 def _sense(before, move, width, fade):  # type: ignore[no-untyped-def]
-    """The sense after a step: ds = (sgn(df) - s) |df|/width - s fade, exact where the load moves evenly."""
+    """The direction after a step: ds = (sgn(df) - s) |df|/width - s fade, exact where the load moves evenly."""
     turned = abs(move) / width
     total = turned + fade
     if total == 0.0:
@@ -242,9 +243,9 @@ def _sense(before, move, width, fade):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def sense_of_motion(load, width, fade, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) in [-1, 1]: s with ds = (sgn(df) - s) |df|/width along ``load`` (n,), that fades by ``fade`` a step.
+    """out (n,) in [-1, 1]: s with ds = (sgn(df) - s) |df|/width along ``load`` (n,), decaying by ``fade`` a step.
 
-    ``state`` (2,): last load (NO_LOAD before the first sample), last sense.
+    ``state`` (2,): last load (NO_LOAD before the first sample), last s.
     """
     last, sense = state
     for k in range(load.size):
@@ -256,11 +257,11 @@ def sense_of_motion(load, width, fade, state, out):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the sense of the backlash of out.
+    """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the `sense_of_motion` of the backlash of out.
 
-    Within the dead zone the sense is as it was; a signal beyond what that gives is sought beyond its end. Where
-    unloading has more gain, a load that turns raises the signal like one that goes on: the signal's next fall tells.
-    ``state`` (2,) as in `sense_of_motion`.
+    Within the dead zone s does not change; for a signal that this cannot explain, the load is sought outside the dead
+    zone. Where unloading has more gain, a load that turns raises the signal like one that keeps rising; which one it
+    was shows in the signal's next fall. ``state`` (2,) as in `sense_of_motion`.
     """
     last, sense = state
     for k in range(signal.size):
@@ -273,7 +274,7 @@ def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type:
             end = last + math.copysign(dead_zone, f - last)
             whole = y / (1.0 - strength)
             far = max(y, whole) if f > last else min(y, whole)
-            way = 1.0 if f > last else -1.0  # a load that falls is sought upside down
+            way = 1.0 if f > last else -1.0  # for a falling load the search is mirrored
             f = low = way * end
             high, under, over, stays = way * far, 0.0, 0.0, 0
             for i in range(STEPS):
@@ -291,7 +292,7 @@ def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type:
 
 @njit(cache=True)
 def _cycle_step(f, least, trough, peak):  # type: ignore[no-untyped-def]
-    """Whether a cycle ends at ``f``, and the new trough and peak."""
+    """Whether a cycle ends at ``f``, and the updated trough and peak."""
     if trough >= NO_LOAD:
         return False, f, f
     if peak - trough < least:
@@ -306,7 +307,7 @@ def _cycle_step(f, least, trough, peak):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def cycles_done(load, least, state, out):  # type: ignore[no-untyped-def]
-    """out (n,): load cycles completed: the load rose by ``least`` and came back but for 5 % of the rise.
+    """out (n,): completed load cycles, in which the load rose by ``least`` and fell by 95 % of that rise.
 
     ``state`` (3,): lowest load since the last cycle, highest since then (NO_LOAD before the first sample), count.
     """
@@ -325,14 +326,14 @@ def conditioned_undone(signal, strength, per_cycle, by_way, stretch, least, widt
 
     n = (1 - by_way) (N per_cycle)^stretch + by_way L/2 per_cycle.
 
-    N are the cycles of out, as in `cycles_done`, L is the way of its play of ``width``. Each sample is sought in at
-    most ``rounds``, until one moves it by no more than ``settled``. ``state`` (5,): N, trough and peak of the cycle,
-    the play (each NO_LOAD before the first sample), L/2.
+    N is the number of cycles of out, as in `cycles_done`; L is the path length of its play of ``width``. Each sample is
+    iterated for at most ``rounds``, until it changes by no more than ``settled``. ``state`` (5,): N, trough and peak of
+    the cycle, the play (each NO_LOAD before the first sample), L/2.
     """
     count, trough, peak, place, gone = state
     for k in range(signal.size):
         f, ended, moved, z = signal[k], False, gone, place
-        for _ in range(2):  # again where a cycle ends with it
+        for _ in range(2):  # repeated where a cycle ends with this sample
             counted = (1.0 - by_way) * (count * per_cycle) ** stretch
             for _ in range(rounds):
                 guess = f
@@ -354,13 +355,14 @@ def conditioned_undone(signal, strength, per_cycle, by_way, stretch, least, widt
 
 @njit(cache=True)
 def rate_undone(signal, strength, exponent, least, softness, dead_zone, step_s, keep, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 + strength s(r)) = ``signal`` (n,), r the rate that raised the signal's own smoothed rate.
+    """out (n,) with out (1 + strength s(r)) = ``signal`` (n,), r the rate that explains the signal's own smoothed rate.
 
-    The factor is no less than ``least``.
+    The factor is at least ``least``.
 
-    s(r) = (r^2 + softness^2)^(exponent/2) - softness^exponent; the signal's rate r (1 + strength s(r)), as on a ramp,
-    is a first-order mean with ``keep`` a step of its way through a play of ``dead_zone``. (From the rate of what comes
-    out, unloading would be unstable.) ``state`` (2,): last cleaned signal (NO_LOAD before the first), its rate.
+    s(r) = (r^2 + softness^2)^(exponent/2) - softness^exponent. The signal's rate equals r (1 + strength s(r)), as on a
+    ramp; it is measured as a first-order mean, with ``keep`` per step, of the signal's changes beyond a play of
+    ``dead_zone``. (With the rate of the output instead, unloading would be unstable.) ``state`` (2,): last cleaned
+    signal (NO_LOAD before the first), its rate.
     """
     last, seen = state
     floor = softness**exponent
@@ -379,7 +381,7 @@ def rate_undone(signal, strength, exponent, least, softness, dead_zone, step_s, 
 
 @njit(cache=True)
 def newton(at, off, slope, low, high):  # type: ignore[no-untyped-def]
-    """Where a rising ``off`` = 0 is sought next, what is left of the bracket, and the step: infinite if halved."""
+    """Next point in the search for a zero of an increasing ``off``, the bracket, and the step (infinite: halved)."""
     if off > 0.0:
         high = at
     else:
@@ -397,19 +399,19 @@ def _orifice(p, laminar):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) = ``pressure`` (n,) - w, with w' = rate p/sqrt(|p|) of what is left, by the implicit trapezoid.
+    """out (n,) = ``pressure`` (n,) - w, with w' = rate out/sqrt(|out|), by the implicit trapezoidal rule.
 
-    ``step_rate`` is rate times step; below ``laminar`` the flow is in proportion. ``state`` (2,): w, last flow over
+    ``step_rate`` is rate times step; below ``laminar`` the flow is proportional. ``state`` (2,): w, last flow over
     rate.
     """
     w, flow = state
     half = 0.5 * step_rate
-    # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
+    # An upper bound of half the equation's curvature: after a step the error is at most its square times that.
     bend = half / (laminar * math.sqrt(laminar))
     half_flow = half * flow
     p, known = 0.0, 0.0
     for k in range(pressure.size):
-        # p + half flow(p) = known rises with p: Newton from the last output moved along, held in a bracket.
+        # p + half flow(p) = known increases with p: Newton from the extrapolated last output, kept in a bracket.
         moved = pressure[k] - w - half_flow - known
         known += moved
         low, high = min(known, 0.0), max(known, 0.0)
@@ -437,15 +439,15 @@ def rise(largest, raised, width):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def tanh(x):  # type: ignore[no-untyped-def]
-    """By one exponential, to the last digit of 1: in a third of the time of `math.tanh`."""
+    """tanh by one exponential, accurate to the last digit of 1, in a third of the time of `math.tanh`."""
     return 1.0 - 2.0 / (math.exp(2.0 * x) + 1.0)
 
 
 @njit(cache=True)
 def softness(x, power, corner):  # type: ignore[no-untyped-def]
-    """Share of the softening that is there at x = (M^2 - u^2)/wide below the largest, tanh(x^power), and its slope.
+    """Share of the softening at x = (M^2 - u^2)/wide below the largest load, tanh(x^power), and its slope over x.
 
-    Last, by how much the slope's logarithm falls with x. A power that is no 1 has its corner at the largest load
+    Also the decrease of the slope's logarithm with x. For a power other than 1 the corner at the largest load is
     rounded by EASED, which leaves ``corner``, EASED^power.
     """
     if power == 1.0:
@@ -461,7 +463,7 @@ def softness(x, power, corner):  # type: ignore[no-untyped-def]
 def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untyped-def]
     """phi of a first loading, own phi + arm u = ``load`` >= 0 and u = phi rise(phi), and the slope of the load in u.
 
-    Newton from ``phi``, held in a bracket; own + arm (1 + raised) is above zero.
+    Newton from ``phi``, kept in a bracket; own + arm (1 + raised) must be above zero.
     """
     if raised == 0.0:
         return load / (own + arm), own + arm
@@ -471,7 +473,7 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
     for _ in range(STEPS):
         bend = tanh(phi * phi / width)
         off = phi * (own + arm * (1.0 + raised * bend)) - load
-        slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # of u in phi
+        slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # du/dphi
         phi, low, high, step = newton(phi, off, own + arm * slope, low, high)
         if abs(step) <= CLOSE:
             break
@@ -480,9 +482,9 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
 
 @njit(cache=True)
 def softened_undone(signal, strength, width, widening, raised, power, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u (1 - strength softness(M^2 rise^2 - u^2))/rise of the ``signal`` u (n,), M the largest out.
+    """out (n,) = u (1 - strength softness(M^2 rise^2 - u^2))/rise for ``signal`` u (n,), with M the largest out so far.
 
-    ``state`` (1,): that largest, less ``dead_zone``.
+    ``state`` (1,): M less ``dead_zone``.
     """
     largest, corner = state[0], EASED**power
     for k in range(signal.size):
@@ -500,7 +502,7 @@ def softened_undone(signal, strength, width, widening, raised, power, dead_zone,
 
 @njit(cache=True)
 def orifice_undone(signal, step_rate, laminar, state, out):  # type: ignore[no-untyped-def]
-    """out (n,): pressure before `orifice`, from what is left (n,). ``state`` (2,): w, last flow over rate."""
+    """out (n,): pressure before `orifice`, from the pressure (n,) after it. ``state`` (2,): w, last flow over rate."""
     lost, last = state
     for k in range(signal.size):
         flow = _orifice(signal[k], laminar)

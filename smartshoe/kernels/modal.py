@@ -1,4 +1,4 @@
-"""A linear network in modal form, straight lines between samples; the plain twin is `smartshoe.models.core.plain`."""
+"""A linear network in modal form, for loads linear between samples; the plain twin is `smartshoe.models.core.plain`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def respond(u, decay, before, after, weights, direct, state, out):  # type: igno
     """
     modes = decay.size
     last = u[0]
-    if 0 < modes <= 2:  # the commonest: states that stay in registers take half the time
-        j = modes - 1  # a single mode is its own second, of no weight
+    if 0 < modes <= 2:  # the most common case: keeping states in registers takes half the time
+        j = modes - 1  # with a single mode, the second is the same with zero weight
         e, b, a, w, m = decay[0], before[0], after[0], weights[0], state[0]
         e2, b2, a2, w2, m2 = decay[j], before[j], after[j], j * weights[j], state[j]
         out[0] = direct * last + w * m + w2 * m2

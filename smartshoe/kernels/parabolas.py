@@ -1,4 +1,4 @@
-"""A curve of parabolas between knots, value by value."""
+"""A piecewise parabolic curve between knots, evaluated value by value."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from numba import njit
 
 @njit(cache=True)
 def along(signal, knots, start, slope, bend, out):  # type: ignore[no-untyped-def]
-    """out (n,) = start + d (slope + d bend), d past the knot before each of ``signal`` (n,); lines beyond the ends.
+    """out (n,) = start + d (slope + d bend), d the distance of ``signal`` (n,) from the knot before.
 
-    ``knots``, ``start`` (value at each knot) and ``slope`` (m + 1,), ``bend`` (m,) half the second derivative.
+    Linear beyond the ends. ``knots``, ``start`` (value at each knot) and ``slope`` (m + 1,), ``bend`` (m,) half the
+    second derivative.
     """
     last = bend.size
     for k in range(signal.size):

@@ -10,10 +10,10 @@ from smartshoe.kernels.first_order import hold
 
 @njit(cache=True)
 def lag_bank(u, at, poles, step, last_u, last_at, lags, out):  # type: ignore[no-untyped-def]
-    """w = pole/(s + pole) u under first-order hold into ``out`` (n, p), and at the end into ``lags`` (p,).
+    """w = pole/(s + pole) u under first-order hold into ``out`` (n, p); its final values into ``lags`` (p,).
 
-    ``u`` (n,) at the whole times ``at`` (n,) of ``step`` s, rising, ``poles`` (p,) in 1/s, ``last_u`` at ``last_at``
-    and ``lags`` what went before. A gap is one long straight line, for which the hold is exact.
+    ``u`` (n,) is at the increasing whole times ``at`` (n,) of ``step`` s, ``poles`` (p,) in 1/s; ``last_u`` at
+    ``last_at`` and ``lags`` are the state before. A gap is one long straight line, for which the hold is exact.
     """
     count = poles.size
     even, wide = np.empty((3, count)), np.empty((3, count))

@@ -1,7 +1,7 @@
-"""State recursions of a linear filter: even steps by its exact matrices, uneven ones by the exponential's action.
+"""State recursions of a linear filter: even steps by exact matrices, uneven ones by the exponential's action.
 
-A state is laid out in two blocks of n, of which the second drives the first and never the other way:
-``[second-order chain, first-order chain]``; see `smartshoe.identification.transfer_function._discrete`.
+A state consists of two blocks of n, of which the second drives the first but not the other way round: ``[second-order
+chain, first-order chain]``; see `smartshoe.identification.transfer_function._discrete`.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-TAYLOR_TERMS = 18  # of the exponential's action on a vector at norm 1: the first one left out is below 1e-17
+TAYLOR_TERMS = 18  # of the exponential's action on a vector at norm 1: the first omitted term is below 1e-17
 
 
 @njit(cache=True)
 def run_even(columns, taps, u, first, start, blocks, out):  # type: ignore[no-untyped-def]
     """States (count, m) of ``s[k+1] = columns.T s[k] + sum_j taps[j] u[first + k + j]`` from ``start`` into ``out``.
 
-    ``columns`` (m, m) is the transposed transition matrix, ``taps`` (taps, m), ``u`` padded so that every index is
-    there (or empty: no input). ``blocks``: the size of the leading block, which does not act on the rest (0: dense).
+    ``columns`` (m, m) is the transposed transition matrix, ``taps`` (taps, m); ``u`` is padded so that every index
+    exists (or empty: no input). ``blocks``: the size of the leading block, which does not act on the rest (0: dense).
     """
     count, m = out.shape
     state = start.copy()
@@ -46,7 +46,10 @@ def run_even(columns, taps, u, first, start, blocks, out):  # type: ignore[no-un
 
 @njit(cache=True)
 def _step(matrix, h, state, term, after):  # type: ignore[no-untyped-def]
-    """``state`` times the exponential of ``matrix`` h by its Taylor series, in place; the others are room for terms."""
+    """Multiply ``state`` by the exponential of ``matrix`` h in place, by its Taylor series.
+
+    The others are work space.
+    """
     size = state.size
     for i in range(size):
         term[i] = state[i]
@@ -73,10 +76,10 @@ def run_uneven(  # type: ignore[no-untyped-def]
 ):
     """States (count, m) at the times ``t`` of ``d/dt s = matrix[:m, :m] s + matrix[:m, m] input`` into ``out``.
 
-    The input has the values ``u`` at the times ``knots`` (rising; straight lines between them where ``hold`` is 1,
-    steps where it is 0; the end values beyond the ends). ``matrix`` (m + 2, m + 2) carries input and slope as two last
-    states, ``norm`` is its 1-norm over the states. A knot less than ``slack`` after a time is taken to be at it.
-    ``value`` and ``slope`` (count,) receive the input at ``t``.
+    The input has the values ``u`` at the increasing times ``knots`` (linear between them where ``hold`` is 1, steps
+    where it is 0; constant beyond the ends). ``matrix`` (m + 2, m + 2) includes input and slope as two last states,
+    ``norm`` is its 1-norm over the states. A knot less than ``slack`` after a time counts as being at it. ``value`` and
+    ``slope`` (count,) receive the input at ``t``.
     """
     count, m = out.shape
     size = m + 2
@@ -85,7 +88,7 @@ def run_uneven(  # type: ignore[no-untyped-def]
     term = np.empty(size)
     after = np.empty(size)
     n = u.size
-    at = -1  # the knot at or before now
+    at = -1  # index of the last knot up to now
     while at + 1 < n and knots[at + 1] <= t[0] + slack:
         at += 1
     for k in range(count):

@@ -1,4 +1,4 @@
-"""Passes over a residual and what it is tested against."""
+"""Passes over a residual for its tests: autocorrelation and orthogonalisation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from numba import njit
 
 CHUNK = 1024  # samples that stay in the first-level cache
-DEPENDENT = 1e-10  # of its norm, left of a row beside those before
+DEPENDENT = 1e-10  # of its norm: a row with less left after projection depends on those before
 _LAX = {"reassoc", "contract", "nsz"}
 
 
@@ -21,9 +21,9 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=_LAX)
 def lagged_products(signal, counted, products, pairs):  # type: ignore[no-untyped-def]
-    """Add the sums over k of signal[k] signal[k - lag], lag 0 ..., to ``products``, and their count to ``pairs``.
+    """Add the sums over k of signal[k] signal[k - lag], lag 0 ..., to ``products``, and their counts to ``pairs``.
 
-    ``signal`` (n,) is 0 where ``counted`` (n,) bool is not; only pairs of counted samples are.
+    ``signal`` (n,) must be 0 where the mask ``counted`` (n,) is False; only pairs of counted samples are included.
     """
     whole = False
     for at in range(0, signal.size, CHUNK):
@@ -50,10 +50,10 @@ def lagged_products(signal, counted, products, pairs):  # type: ignore[no-untype
 
 @njit(cache=True, fastmath=_LAX)
 def orthogonalise(rows, basis):  # type: ignore[no-untyped-def]
-    """Make the first ``basis`` of ``rows`` (r, n) orthonormal, the rest of norm 1, then orthogonal to them, in place.
+    """Orthonormalise the first ``basis`` of ``rows`` (r, n); normalise the rest, then project the basis out; in place.
 
-    Modified Gram-Schmidt: normal equations would lose half of the digits. A row of the basis that depends on those
-    before becomes 0.
+    Modified Gram-Schmidt, since normal equations would lose half of the digits. A row of the basis that depends on
+    those before becomes 0.
     """
     for i in range(rows.shape[0]):
         row = rows[i]
@@ -61,7 +61,7 @@ def orthogonalise(rows, basis):  # type: ignore[no-untyped-def]
         scale = 1.0 / norm if norm > 0.0 else 0.0
         for j in range(row.size):
             row[j] *= scale
-        for _ in range(2 if i < basis else 1):  # what is left of a row of the basis may be short
+        for _ in range(2 if i < basis else 1):  # twice, as the remainder of a basis row may be small
             for k in range(min(i, basis)):
                 other = rows[k]
                 share = _dot(row, other)

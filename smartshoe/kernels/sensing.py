@@ -1,4 +1,4 @@
-"""What a sensor and a logger do to a signal, where each sample needs weights of its own."""
+"""Effects of a sensor and a logger on a signal, where each sample needs its own weights."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numba import njit
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
-    """out[k] = u at the place k - late[k], in samples; beyond the ends the end values hold.
+    """out[k] = u interpolated at k - late[k], in samples; beyond its ends u keeps its end values.
 
-    ``u``, ``late``, ``out`` (n,); ``weights`` (m + 1, 16) of the neighbours -7 ... 8 of a place at the fractions 0,
-    1/m, ... 1 past a sample, interpolated between two fractions. ``out`` is overwritten.
+    ``u``, ``late``, ``out`` (n,). ``weights`` (m + 1, 16) are those of the neighbours -7 ... 8 of a position at the
+    fractions 0, 1/m, ... 1 past a sample; they are interpolated between two fractions. ``out`` is overwritten.
     """
     n, fractions = u.size, weights.shape[0] - 1
     for k in range(n):
@@ -39,9 +39,9 @@ def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def lagged_by_direction(start, rise, keep_rising, fall, keep_falling):  # type: ignore[no-untyped-def]
-    """w (n,), each ``keep`` of the value before and the drive of its step: ``rise`` (n,) where it rises, else ``fall``.
+    """w (n,), each ``keep`` times the value before plus the drive of its step: ``rise`` (n,) if w rises, else ``fall``.
 
-    Where neither way leads up nor down, what is followed crosses, and it stays.
+    Where neither leads w in its own direction, the followed signal crosses w, and w stays.
     """
     out = np.empty(rise.size)
     last = start

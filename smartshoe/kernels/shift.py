@@ -1,4 +1,4 @@
-"""A signal between its samples: one weighted sum of sixteen neighbours, and its derivative."""
+"""Interpolates a signal between its samples: one weighted sum of sixteen neighbours, and its derivative."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def fill_taps(fraction, taps, slopes):  # type: ignore[no-untyped-def]
 def shift(u, samples, rate, value, slope):  # type: ignore[no-untyped-def]
     """``u`` (n,) at k + ``samples`` into ``value`` (n,), ``rate`` times its derivative over ``samples`` into ``slope``.
 
-    ``rate`` is what the caller's unit of delay is in samples. Beyond the ends the end values hold.
+    ``rate`` converts the caller's unit of delay to samples. Beyond its ends u keeps its end values.
     """
     n = u.size
     taps, slopes, padded = np.empty(NEIGHBOURS), np.empty(NEIGHBOURS), np.empty(CHUNK + NEIGHBOURS)
@@ -67,7 +67,7 @@ def shift(u, samples, rate, value, slope):  # type: ignore[no-untyped-def]
         here, rise = value[at : at + m], slope[at : at + m]
         for k in range(m):
             here[k] = rise[k] = 0.0
-        # Four neighbours at a time: as many as stay in registers beside their eight weights.
+        # Four neighbours at a time: as many as fit in registers with their eight weights.
         for j in range(0, NEIGHBOURS, 4):
             a, b, c, d = taps[j], taps[j + 1], taps[j + 2], taps[j + 3]
             e, f, g, h = slopes[j], slopes[j + 1], slopes[j + 2], slopes[j + 3]

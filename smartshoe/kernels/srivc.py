@@ -1,4 +1,4 @@
-"""Passes over an experiment for SRIVC: its inner products, and those that tell the delay to start from."""
+"""Passes over an experiment for SRIVC: its inner products, and those for the initial search of the delay."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numba import njit
 
 from smartshoe.kernels.first_order import CHUNK, COLUMNS, add_products, hold, leave_out, recur
 
-INSTRUMENT, REGRESSOR, TARGET = 0, 5, 6  # columns; 1 to 4 are instruments and regressors both
+INSTRUMENT, REGRESSOR, TARGET = 0, 5, 6  # columns; 1 to 4 are both instruments and regressors
 _LAX = {"reassoc", "contract", "nsz"}
 
 
@@ -69,9 +69,9 @@ def instrument_products(u, y, x, counted, step_s, uneven, pole, out):  # type: i
 
 @njit(cache=True, fastmath=_LAX)
 def delayed_products(u, w, y, inside, stride, out):  # type: ignore[no-untyped-def]
-    """Sums over the m samples of ``y`` and ``inside`` with u and w each ``stride`` samples further on, a row a shift.
+    """Sums over the m samples of ``y`` and ``inside`` with u and w, shifted by another ``stride`` samples per row.
 
-    ``out`` (shifts, 7) receives those of u, w, u u, u w, w w where inside (m,) is 1, and of u y and w y.
+    ``out`` (shifts, 7) receives the sums of u, w, u u, u w, w w where inside (m,) is 1, and of u y and w y.
     """
     m = y.size
     for row in range(out.shape[0]):

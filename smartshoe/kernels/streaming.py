@@ -15,14 +15,14 @@ _BANK = "float64[:, ::1]"
 
 @njit(inline="always", error_model="numpy")
 def _step(reading, bank, unit):  # type: ignore[no-untyped-def]
-    """Force of one reading of one unit; its column of ``bank`` moves on."""
+    """Force of one reading of one unit; updates the unit's column of ``bank``."""
     if not np.isfinite(reading):
         bank[7, unit] += 1.0
         reading = bank[6, unit]
         if np.isnan(reading):
             return 0.0
     elif np.isnan(bank[6, unit]):
-        # y = n0 u + state: the state that makes the first output the static gain's.
+        # With y = n0 u + state, this state makes the first output that of the static gain.
         bank[5, unit] = (bank[3, unit] - bank[0, unit]) * (reading - bank[4, unit])
     bank[6, unit] = reading
     u = reading - bank[4, unit]
@@ -33,7 +33,7 @@ def _step(reading, bank, unit):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean(float64[::1], float64[::1], {_BANK})", cache=True, error_model="numpy")
 def push_tick(readings, forces_n, bank):  # type: ignore[no-untyped-def]
-    """Write the forces (units,) of one tick of readings (units,); False, and nothing done, where shapes differ."""
+    """Write the forces (units,) of one tick of readings (units,); False, without any effect, where shapes differ."""
     units = bank.shape[1]
     if readings.size != units or forces_n.size != units:
         return False
@@ -44,7 +44,7 @@ def push_tick(readings, forces_n, bank):  # type: ignore[no-untyped-def]
 
 @njit(f"void(float64[:, ::1], float64[:, ::1], {_BANK})", cache=True, error_model="numpy")
 def push_block(readings, forces_n, bank):  # type: ignore[no-untyped-def]
-    """Write the forces (ticks, units) of readings (ticks, units), time-major; shapes must agree."""
+    """Write the forces (ticks, units) of readings (ticks, units) of the same shape, tick by tick."""
     for tick in range(readings.shape[0]):
         for unit in range(readings.shape[1]):
             forces_n[tick, unit] = _step(readings[tick, unit], bank, unit)

@@ -1,4 +1,4 @@
-"""Where a load turns; the plain twin is in tests/signals/test_turning_points.py."""
+"""Finds where a load turns; the plain twin is in tests/signals/test_turning_points.py."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from numba import njit
 
 @njit(cache=True)
 def turning_points(load, threshold, points):  # type: ignore[no-untyped-def]
-    """Fill ``points`` (n + 1,) with the samples at which ``load`` (n,) turns by more than ``threshold``; how many.
+    """Fill ``points`` (n + 1,) with the samples where ``load`` (n,) turns by more than ``threshold``.
 
-    The first is its first sample; a zig-zag within the threshold is no turn.
+    Returns their number. The first one is the first sample; a zig-zag within the threshold is not a turn.
     """
     found, direction, low, high = 1, 0, 0, 0
     points[0] = 0

@@ -1,8 +1,8 @@
-"""Springs that bend beside the arm that relaxes: the balance of both, sample by sample.
+"""Nonlinear springs beside a relaxing arm: the balance of both, sample by sample.
 
-f = phi(u) + kappa (u - q), q' = a (u - q), u the deformation: all begin in the steady state of the first load, where
+f = phi(u) + kappa (u - q), q' = a (u - q), u the deformation. All begin in the steady state of the first load, where
 the arm bears nothing. ``share`` is kappa; q is u through `models.first_order.lag`, whose coefficients are ``decay``,
-``now`` and ``before``, so that within a sample the arm is a straight spring that is held elsewhere.
+``now`` and ``before``, so that within a sample the arm acts as a linear spring with a shifted end.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ from numba import njit
 
 from smartshoe.kernels.memory import EASED, first_loading, newton, rise, softness
 
-CLOSE = 1e-8  # of full scale: a step of Newton's that is less leaves about its square
-ALIKE = 0.05  # of its logarithm: over a step that turns a curvature by less it is the same
+CLOSE = 1e-8  # of full scale: after a smaller Newton step the error is about its square
+ALIKE = 0.05  # in its logarithm: a curvature that changes by less over a step counts as constant
 STEPS = 30
 
 
 @njit(cache=True)
 def inflection(cubic, fifth):  # type: ignore[no-untyped-def]
-    """u at which (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth) is steepest, and its slope; infinite and 0: none."""
+    """u at which (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth) is steepest, and its slope.
+
+    Infinity and 0 where there is no such u.
+    """
     if fifth >= 0.0:
         return math.inf, 0.0
     square = -0.3 * cubic / fifth
@@ -39,7 +42,7 @@ def hardened(load, cubic, fifth, share, decay, now, before, out):  # type: ignor
     u, q, known, slope = 0.0, 0.0, 0.0, 1.0 / whole
     for k in range(load.size):
         last, f = u, load[k] + held
-        u += (f - known) / slope  # moved along with the load
+        u += (f - known) / slope  # the first guess follows the load
         for _ in range(STEPS):
             within = min(max(u, -end), end)
             square = within * within
@@ -59,8 +62,8 @@ def hardened(load, cubic, fifth, share, decay, now, before, out):  # type: ignor
 def compressed(load, ratio, wall, share, decay, now, before, out):  # type: ignore[no-untyped-def]
     """out (n,) = p under ``load`` (n,), phi = p (1 + wall/(1 + g p))/whole and u = (1 + g) p/(1 + g p).
 
-    ``ratio`` is g, whole = 1 + wall/(1 + g). Times 1 + g p the balance is quadratic in p; its other root is a gas of
-    less than no absolute pressure.
+    ``ratio`` is g, whole = 1 + wall/(1 + g). Multiplied by 1 + g p the balance is quadratic in p; its other root has a
+    negative absolute pressure.
     """
     whole = 1.0 + wall / (1.0 + ratio)
     bend = ratio / whole
@@ -96,13 +99,13 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
         if f >= most * (1.0 + arm * more):
             phi, slope = first_loading(f, raised, width, 1.0, arm, phi)
             u = phi * rise(phi, raised, width)
-        elif not k or f != known:  # a pause leaves it where it is, to the last digit
-            # It rises with u: Newton from the last output moved along, held in a bracket.
+        elif not k or f != known:  # during a pause the value stays the same, to the last digit
+            # The balance increases with u: Newton from the extrapolated last output, kept in a bracket.
             given, beside = f * more, arm * more
             straight = given / (1.0 + beside)
             low, high = straight, most * more
             if f <= 0.0:
-                lost = min(strength * softness(top * per_wide, power, corner)[0], 0.95)  # more leaves nothing to pull
+                lost = min(strength * softness(top * per_wide, power, corner)[0], 0.95)  # more would leave no stiffness
                 low, high = given / (1.0 - lost + beside), straight
             u, moved = min(max(u + (f - known) / slope, low), high), math.inf
             for _ in range(STEPS):
@@ -114,11 +117,11 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
                     turns = strength * per_wide * steep * abs(u) * (3.0 + 2.0 * turn * falls)
                 was = u
                 u, low, high, step = newton(u, off, slope, low, high)
-                if abs(step) > 0.5 * moved:  # to and fro across the corner
+                if abs(step) > 0.5 * moved:  # oscillating across the corner
                     u, step = 0.5 * (low + high), math.inf
                 moved = abs(step)
-                # A step leaves an error of its square times half the curvature where that is the same all along it.
-                # Beyond the corner nothing tells what the curvature is before it.
+                # After a step the error is its square times half the curvature, if that is constant over the step.
+                # The curvature beyond the corner does not tell the one before it.
                 if abs(step) <= CLOSE:
                     break
                 if bend > 0.0 and turns * step * step <= 5e-11 * slope and abs(was * step) * per_wide * falls <= ALIKE:

@@ -1,7 +1,7 @@
-"""Compiles the fit's kernels beside other work, the first time that this machine runs them.
+"""Compiles the fit's kernels in parallel with other work, the first time that a machine runs them.
 
-Compiled code is cached on disk, so that this happens once an installation. A scenario's devices take a second or two on
-one core before the first fit: by then a second core has the kernels ready.
+Compiled code is cached on disk, so that this happens once per installation. A scenario's devices take a second or two
+on one core before the first fit: by then a second core has the kernels ready.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ KERNELS = ("first_order", "shift", "srivc", "residual", "linear_filter")
 
 
 def begin() -> None:
-    """Start the compilation in a process of its own, unless its results are there; never fails, never waits."""
+    """Start the compilation in a separate process, unless its results exist; never fails, never waits."""
     if all(any(CACHE.glob(f"{name}.*.nbi")) for name in KERNELS):
         return
-    # Where the package lies, so that neither is a module of the caller's folder taken for one of ours, nor is that
-    # folder missed when it goes. What fails there the fit meets again, and tells.
+    # Run in the package's folder, so that no module of the caller's folder is taken for one of ours, and that
+    # folder may be deleted meanwhile. Any failure will recur, and be reported, in the fit itself.
     quiet = subprocess.DEVNULL
     command = [sys.executable, "-m", __spec__.name]
     process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, cwd=Path(__file__).parents[2])
@@ -31,7 +31,7 @@ def begin() -> None:
 
 
 def compile_all() -> None:
-    """Call each kernel once, on a few numbers of the types that `identify` hands it."""
+    """Call each kernel once, on a few numbers of the types that `identify` passes to it."""
     import numpy as np
 
     from smartshoe.kernels.first_order import COLUMNS, inner_products, respond
@@ -54,7 +54,7 @@ def compile_all() -> None:
 
 
 def compile_alone() -> bool:
-    """Compile, each kernel once whoever else is at it, unless nothing can be cached here; whether it was done."""
+    """Compile each kernel, once among all processes, if the results can be cached here; returns whether it was done."""
     if not os.access(CACHE, os.W_OK):
         return False
     compile_each_kernel_once()

@@ -1,1 +1,1 @@
-"""What a load signal is made of: runs of good samples, ramps, cycles."""
+"""Basic analysis of sampled signals: runs of good samples, lags, noise, ramps and cycles of a load."""

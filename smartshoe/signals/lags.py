@@ -1,4 +1,4 @@
-"""A first-order lag of a sampled signal."""
+"""First-order lag of a sampled signal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from smartshoe.arrays import Array
 
 
 def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
-    """``signal`` (n,) through a first-order lag that holds each sample for a step, started in steady state."""
+    """``signal`` (n,) through a first-order lag that holds each sample for one step, started in steady state."""
     from scipy.signal import lfilter
 
     keep = float(np.exp(-step_s / tau_s))

@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 
-# A ramp counts where it spans this share of the record's load range; slower drifting is hold or rest.
+# A ramp counts where it spans this share of the record's load range; less is drift within a hold or rest.
 LEAST_SPAN = 0.3
 SAME_RATE = 0.10
 
@@ -26,7 +26,7 @@ class Ramp:
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """A loading ramp and the unloading that follows it; ``start:stop`` covers both and what lies between."""
+    """A loading ramp and the unloading after it; ``start:stop`` covers both and what lies between."""
 
     up: Ramp
     down: Ramp
@@ -48,9 +48,9 @@ class Cycle:
 
 
 def turning_points(load_n: Array, threshold_n: float) -> list[int]:
-    """Samples at which the load (n,) turns by more than ``threshold_n`` (a zig-zag that noise does not trip).
+    """Samples at which the load (n,) turns by more than ``threshold_n``, which noise must not exceed.
 
-    The first sample and the last are among them.
+    The first sample and the last are included.
     """
     from smartshoe.kernels.turning import turning_points as run
 
@@ -60,7 +60,7 @@ def turning_points(load_n: Array, threshold_n: float) -> list[int]:
 
 
 def rises_of(load_n: Array, threshold_n: float) -> list[tuple[int, int]]:
-    """The samples of foot and top of each rise of a load (n,) between its `turning_points`."""
+    """Pairs of samples (foot, top) of each rise of a load (n,) between its `turning_points`."""
     return [(a, b) for a, b in pairwise(turning_points(load_n, threshold_n)) if load_n[b] > load_n[a]]
 
 
@@ -87,14 +87,14 @@ def ramps(time_s: Array, load_n: Array) -> list[Ramp]:
         if end <= begin:
             continue
         rate = float((part[end] - part[begin]) / (time_s[first + end] - time_s[first + begin]))
-        # The ramp itself, by its own slope, without the rest before it and the hold after it.
+        # Only the ramp itself, bounded by its own slope, without the rest before and the hold after it.
         lead = int(np.ceil(0.125 * (end - begin)))
         found.append(Ramp(first + max(begin - lead, 0), min(first + end + lead, last) + 1, rate))
     return found
 
 
 def cycles(time_s: Array, load_n: Array) -> list[Cycle]:
-    """Each loading ramp with the unloading that follows it."""
+    """Each loading ramp together with the unloading after it."""
     found = ramps(time_s, load_n)
     return [Cycle(up, down) for up, down in pairwise(found) if up.rate_n_per_s > 0 > down.rate_n_per_s]
 
@@ -111,10 +111,11 @@ def by_rate(found: list[Cycle]) -> dict[float, list[Cycle]]:
 
 
 def rate_range(courses: Iterable[tuple[Array, Array]]) -> tuple[float, float]:
-    """Slowest and fastest loading in N/s: where 5 % and 95 % of all rise of load are done, over tenths of a second.
+    """Slowest and fastest loading in N/s: the 5 % and 95 % quantiles of rate, weighted by rise of load.
 
-    ``courses`` are pairs of time in s and load in N, each (n,), one a recording. By load, not by time: a fast triangle
-    is over before it makes a hundredth of a session's samples. (0, 0) where no load rises.
+    ``courses`` are pairs of time in s and load in N, each (n,), one per recording; rates are taken over tenths of a
+    second. Quantiles are by load, not by time, since a fast triangle takes less than a hundredth of a session's
+    samples. (0, 0) where no load rises.
     """
     slopes, rises = [], []
     for time_s, load_n in courses:

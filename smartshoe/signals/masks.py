@@ -1,4 +1,4 @@
-"""Runs of True in a mask, and signals over what a mask says is missing."""
+"""Runs of True in a mask, and interpolation of signals over missing samples."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from smartshoe.arrays import Array, Index, Mask
 
 
 def runs_of(mask: Mask) -> tuple[Index, Index]:
-    """First samples and one-past-last samples of the runs of True in ``mask`` (n,)."""
+    """Start and end indices (end excluded) of the runs of True in ``mask`` (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return edges[0::2], edges[1::2]
 
 
 def bridged(time_s: Array, values: Array, present: Mask) -> Array:
-    """A copy of ``values``, missing samples on the line between their neighbours: what the model takes for granted.
+    """A copy of ``values`` with missing samples interpolated linearly between their neighbours, as the model assumes.
 
-    A copy, since a compiled pass is compiled anew for arrays that may not be written.
+    It is a copy because compiled functions would be compiled again for read-only arrays.
     """
     if present.all() or not present.any():
         return np.array(values, dtype=float)

@@ -1,4 +1,4 @@
-"""White noise: how large it is beside a signal, and what of a normal law lies where."""
+"""White noise of a signal: its standard deviation, and constants of the normal distribution."""
 
 from __future__ import annotations
 
@@ -10,35 +10,36 @@ import numpy as np
 from smartshoe.arrays import Array
 
 NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal law
-NORMAL_QUARTILE = 0.6744897501960817  # and the half of it: the median of the absolute value
+NORMAL_QUARTILE = 0.6744897501960817  # those that hold half of it: the median of the absolute value
 MAINS_HZ = (50.0, 60.0)
-WILD = 4.0  # standard deviations, beyond which one of 16,000 is noise
-UNIFORM_SD = 1.0 / math.sqrt(12.0)  # of what is anywhere within one step: a rounded value, a time in its interval
+WILD = 4.0  # standard deviations: only one of 16,000 samples of noise lies beyond
+UNIFORM_SD = 1.0 / math.sqrt(12.0)  # sd in steps of what is uniform within one, such as a rounded value
 
 
 def robust_sd(deviations: Array) -> float:
-    """Standard deviation of normal ``deviations`` (n,) about 0, from the median of their size; 0 where there is none.
+    """Standard deviation of normal ``deviations`` (n,) about 0, from the median of their magnitude.
 
-    So a few that are wild do not matter.
+    0 if there are none. A few outliers therefore have no effect.
     """
     size = deviations.size
     if size == 0:
         return 0.0
-    # A median by one partition: numpy's would look for NaN, of which there is none.
+    # A median by one partition; numpy's would also search for NaN, which does not occur.
     middle = np.partition(np.abs(deviations), size // 2)
     median = middle[size // 2] if size % 2 else 0.5 * (middle[size // 2] + middle[: size // 2].max())
     return float(median) / NORMAL_QUARTILE
 
 
 def is_switched(values: Array, few: int, false_alarm: float) -> bool:
-    """Whether ``values`` (n,) are a ``few`` at most, each stayed at for longer than by chance, but for a false alarm.
+    """Whether ``values`` (n,) are at most ``few`` different ones, each held for longer than chance would allow.
 
-    The steps between them are the signal's own then, as those of a drive that is on or off. Noise between the steps of
-    a grid is as likely to be on either at each sample, whatever it was before.
+    Steps between them are then part of the signal, like those of a drive that is on or off. Noise between the steps of
+    a quantisation grid is as likely to be on either at each sample, whatever the one before was. ``false_alarm`` is the
+    probability of a wrong answer for such noise.
     """
     from scipy.special import ndtri
 
-    if values.size < 2 or np.unique(values[: few * few]).size > few:  # most signals show it soon
+    if values.size < 2 or np.unique(values[: few * few]).size > few:  # a quick test that excludes most signals
         return False
     levels, count = np.unique(values, return_counts=True)
     if levels.size > few:
@@ -49,16 +50,17 @@ def is_switched(values: Array, few: int, false_alarm: float) -> bool:
 
 
 def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None, step: float = 0.0) -> float:
-    """Standard deviation of the white noise on smooth ``signals`` (n,), by the median of their differences.
+    """Standard deviation of white noise on smooth ``signals`` (n,), from the median magnitude of their differences.
 
-    Second differences (``order``) take off a straight line, third ones a bend; corners are few and do not move a
-    median. Of more than ``most`` differences so many are looked at. A converter's ``step`` adds its own, step/sqrt(12),
-    and hides what is smaller: of whole steps the median is one too, and leaves half a step open to either side, so that
-    the mean square decides, without what is wild or a corner. 0 where signals are too short.
+    Second differences (``order``) remove a straight line, third ones also a curvature; corners are few and do not
+    affect a median. At most about ``most`` differences are used. A converter's ``step`` adds its own noise,
+    step/sqrt(12), and hides smaller noise: the median of whole steps is a whole step too, uncertain by half a step
+    either way, so that in that case the mean square decides, without outliers and corners. 0 where signals are too
+    short.
     """
     share = max(sum(signal.size for signal in signals) // most, 1) if most else 1
     found = [_differences(signal, order, share) for signal in signals if signal.size > order + 1]
-    power = math.comb(2 * order, order)  # the sum of the squares of the difference's weights
+    power = math.comb(2 * order, order)  # sum of squares of the difference's weights
     if not found:
         return 0.0
     differences, scale = np.concatenate(found), 1.0 / math.sqrt(power)
@@ -72,7 +74,7 @@ def white_noise_sd(*signals: Array, order: int = 2, most: int | None = None, ste
 
 
 def autocovariance(rows: Array) -> Array:
-    """(n,) sums of the products of a series (n,) with itself at the lags 0 ... n - 1; of rows (m, n) all of theirs."""
+    """(n,) sums of products of a series (n,) with itself at lags 0 to n - 1; for rows (m, n) summed over the rows."""
     n = rows.shape[-1]
     power = np.abs(np.fft.rfft(np.atleast_2d(rows), 2 * n, axis=1)) ** 2
     return np.asarray(np.fft.irfft(np.sum(power, axis=0), 2 * n)[:n])

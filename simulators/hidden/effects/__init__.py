@@ -1,7 +1,7 @@
-"""What can be hidden in a simulated unit: every effect of the catalogue under several laws, and some outside of it.
+"""The effects that can be hidden in a simulated unit: all of the catalogue under several laws, and some others.
 
-One file a family lists its effects: to add a truth is to add an entry there. `simulators.hidden.effects._registry` says
-what an entry is made of, `simulators.hidden.effects._law` how a further law acts.
+One file per family lists its effects: to add a truth, add an entry there. `simulators.hidden.effects._registry`
+describes an entry, `simulators.hidden.effects._law` how a further law acts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _FAMILIES = (
 )  # fmt: skip
 
 EFFECTS: dict[str, Hideable] = {effect.name: effect for family in _FAMILIES for effect in family.EFFECTS}
-# Without options of the machine's own, so that only a law makes them.
+# The machine has no options for these; only a law produces them.
 BY_LAW_ALONE: dict[str, Hideable] = {effect.name: effect for effect in outside.BY_LAW_ALONE}
 
 __all__ = [

@@ -34,14 +34,14 @@ if TYPE_CHECKING:
 
 Place = Literal["load", "stress", "gas", "leak", "reading", "shift", "log", "tare", "options"]
 
-BUMPS = 3  # of a warp
+BUMPS = 3  # sine terms of a warp
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What a law may look at beside its argument.
+    """What a law may use besides its argument.
 
-    (n,) each: time since the session's start, load, deformation, pressure, the room above its temperature at the
+    (n,) each: time since the session's start, load, deformation, pressure, and the room's temperature above that at the
     start. ``span_s`` is the session's length, ``number`` counts sessions, ``stiff`` is k1 x0^2/(nRT); ``rng`` draws
     what differs from session to session.
     """
@@ -63,10 +63,10 @@ def _as_it_is(amount: float, draws: Draws, signal: Array, at: Surroundings) -> A
 
 @dataclass(frozen=True)
 class Law:
-    """One further law. ``act(amount, draws, signal, at)`` is described in the module by its ``place``.
+    """One further law. ``act(amount, draws, signal, at)`` is described in the module's docstring by its ``place``.
 
-    ``typical`` is an amount that leaves about 1 % of full scale, ``largest`` the largest there is. ``bends`` is what
-    a departure warps: "signal" or "time"; None where a departure means nothing (noise, faults of the data).
+    ``typical`` is an amount that leaves about 1 % of full scale, ``largest`` the largest possible one. ``bends`` is
+    what a departure warps: "signal" or "time"; None where a departure has no meaning (noise, faults of the data).
     """
 
     name: str
@@ -91,25 +91,25 @@ class Law:
         largest: float,
         draw: Drawing,
     ) -> Law:
-        """A law that the machine's own options switch on, as they do the first one."""
+        """A law that the machine's own options switch on, like the first one."""
         return cls(name, "options", says, source, _as_it_is, typical, largest, draw, None, options)
 
 
 @dataclass(frozen=True)
 class Warp:
-    """A smooth monotone map of [0, 1] onto itself, beyond it a shift: x + size sum_k w_k sin(k pi x)/(k pi)."""
+    """A smooth monotone map of [0, 1] onto itself, continued by a shift: x + size sum_k w_k sin(k pi x)/(k pi)."""
 
     size: float = 0.0
     weights: tuple[float, ...] = field(default=())
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Warp:
-        """A warp of size 1 whose slope stays above zero: the weights' sum of absolute values is one."""
+        """A random warp of size 1 whose slope stays positive: the weights' absolute values sum to one."""
         weights = rng.standard_normal(BUMPS) / np.arange(1, BUMPS + 1)
         return cls(1.0, tuple(float(w) for w in 0.95 * weights / np.abs(weights).sum()))
 
     def of(self, x: Array) -> Array:
-        """The map (n,) of x (n,)."""
+        """The map's values (n,) at x (n,)."""
         if self.size == 0.0 or not self.weights:
             return x
         place = np.pi * np.clip(x, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Gain that depends on the direction."""
+"""Hidden effects: gain that depends on the direction of loading."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from smartshoe.arrays import Array
 
 
 def two_contacts(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Two contacts in a row, one of which turns over ten and more times later than the other (partial slip)."""
+    """Two contacts in series, one of which reverses after at least ten times the travel of the other (partial slip)."""
     way = np.diff(f, prepend=0.0)
     quick, late = np.empty(f.size), np.empty(f.size)
     follow(way, np.full(f.size, draws["quick"]), 1.0, quick)
@@ -22,7 +22,7 @@ def two_contacts(amount: float, draws: Draws, f: Array, at: Surroundings) -> Arr
 
 
 def by_velocity(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Friction that turns over with a slow velocity: tanh(v/v0), v seen through a short lag; none in holds."""
+    """Friction that follows a slow velocity: tanh(v/v0), v seen through a short lag; none in holds."""
     velocity = np.gradient(lagged(f, 0.05, at.step_s), at.step_s)
     return np.asarray(f * (1.0 + 0.5 * draws["sign"] * amount * np.tanh(velocity / draws["slow"])))
 

@@ -1,4 +1,4 @@
-"""A neighbour's reading in this one; how it couples stands in `simulators.effects.room`."""
+"""Hidden effects: a neighbour's reading leaking into this one; `simulators.effects.room` has the coupling."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from simulators.hidden.effects._registry import Draws, Hideable, Options, Subjec
 
 
 def neighbour(amount: float, draws: Draws, subject: Subject) -> Options:
-    """A logged neighbour that couples by ``amount``."""
+    """Machine options with a logged neighbour whose coupling is ``amount``."""
     given = {"highest_mbar": subject.full_scale_mbar, "noise_mbar": 0.001 * subject.full_scale_mbar}
     coupling = {key: draws[key] for key in ("lag_s", "from_share") if key in draws}
     return {"neighbour": {"logged": True, "cross_talk": amount, "period_s": draws["period_s"], **given, **coupling}}
@@ -17,7 +17,7 @@ EFFECTS = [
     Hideable("cross_talk", "cross_talk", "sensor", "cross_talk", "1", 0.01, 1.0, neighbour,
         uniform(period_s=(2.0, 5.0)), law="proportional",
         says="a share of the neighbour's pressure", source="common supply",
-        catalogue=lambda a, d, s, hz: {"coupling_mbar": a * s.full_scale_mbar},  # at the neighbour's largest
+        catalogue=lambda a, d, s, hz: {"coupling_mbar": a * s.full_scale_mbar},  # at the neighbour's largest pressure
         laws=(
             Law.of_options("lagged", "through a lag: along the insole", "first order", neighbour, 0.01, 1.0,
                            uniform(period_s=(2.0, 5.0), lag_s=(0.1, 0.5))),

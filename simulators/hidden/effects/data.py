@@ -1,4 +1,4 @@
-"""Faults of the file rather than of the unit."""
+"""Hidden effects: faults of the file rather than of the unit."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from smartshoe.arrays import Array
 
 
 def floor_of_bits(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A converter that cuts off, its first step not at zero."""
+    """A converter that truncates, with its first step not at zero."""
     return np.asarray((np.floor(y / amount - draws["begins"]) + draws["begins"] + 0.5) * amount)
 
 
 def companding(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Steps that grow with the reading: a logarithmic code of telephony; ``amount`` is the step at full scale."""
+    """Steps that grow with the reading, as in telephony's logarithmic code; ``amount`` is the step at full scale."""
     mu = draws["mu"]
-    step = amount / (1.0 + mu) * mu / np.log1p(mu) * np.log1p(mu)  # of ln(1 + mu y)
+    step = amount / (1.0 + mu) * mu / np.log1p(mu) * np.log1p(mu)  # step of ln(1 + mu y)
     code = np.sign(y) * np.log1p(mu * np.abs(y))
     return np.asarray(np.sign(code) * np.expm1(np.abs(np.rint(code / step) * step)) / mu)
 
 
 def every_nth(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A sensor a little slower than its logger: every n-th sample is the one before."""
+    """A sensor slightly slower than its logger: every n-th sample repeats the one before."""
     nth = max(2, round(1.0 / amount))
     place = np.arange(y.size)
     return y[np.where(place % nth == nth - 1, place - 1, place)]
 
 
 def freezes(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A bus that hangs: few freezes, each of a third of a second to a second."""
+    """A bus that hangs: a few freezes, each of a third of a second to a second."""
     from simulators.effects.logging import runs
 
     held = runs(y.size, amount, max(draws["freeze_s"] / at.step_s, 2.0), at.rng)
@@ -39,7 +39,7 @@ def freezes(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
 
 
 def under_load(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A plug that loses contact where the shoe is bent: in runs, at high loads only, at the unloaded value."""
+    """A plug that loses contact where the shoe bends: runs at the unloaded value, at high loads only."""
     from simulators.effects.logging import runs
 
     gone = runs(y.size, min(3.0 * amount, 1.0), draws["run"], at.rng) & (at.load > 0.4)
@@ -47,7 +47,7 @@ def under_load(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array
 
 
 def single_samples(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Lost packets of one sample: empty cells."""
+    """Lost packets of one sample each, which leave empty cells."""
     gone = at.rng.random(y.size) < amount
     gone[:1] = False
     return np.where(gone, np.nan, y)

@@ -1,4 +1,4 @@
-"""Load that something else takes before the tube is touched."""
+"""Hidden effects: load that something else takes before the tube is touched."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from smartshoe.arrays import Array
 
 
 def hinge(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """A hyperbola between nothing and the load less the gap."""
+    """A hyperbola between zero and the load minus the gap."""
     width = draws["width"] * amount
     bent = 0.5 * (f - amount + np.sqrt((f - amount) ** 2 + width**2))
     return np.asarray(bent - 0.5 * (np.sqrt(amount**2 + width**2) - amount))
 
 
 def frame(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """A frame beside the tube that yields: it bears up to the gap's load, tanh."""
+    """A yielding frame beside the tube: it bears up to the gap's load, as a tanh."""
     return np.asarray(f - amount * np.tanh((f / (draws["give"] * amount)) ** draws["power"]) * (f > 0.0))
 
 

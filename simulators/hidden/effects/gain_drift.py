@@ -1,4 +1,4 @@
-"""Gain that changes by the clock or with temperature."""
+"""Hidden effects: gain that changes with time or temperature."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def _catalogue(amount: float, draws: Draws, subject: Subject, hz: float) -> dict
 
 
 def settling(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """An exponential that settles within the session."""
+    """An exponential change that settles within the session."""
     course = np.expm1(-at.time_s / draws["time_constant_s"])
     return np.asarray(y * (1.0 - draws["sign"] * amount * course))
 
 
 def oxidation(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """sqrt(1 + t/tau) - 1: linear at first, then by the root."""
+    """sqrt(1 + t/tau) - 1: linear at first, then as the square root."""
     return np.asarray(y * (1.0 + draws["sign"] * amount * (np.sqrt(1.0 + at.time_s / draws["time_constant_s"]) - 1.0)))
 
 

@@ -1,4 +1,4 @@
-"""Heat of compression that has not yet left the air."""
+"""Hidden effects: heat of compression that has not yet left the air."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def slab(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
 
 
 def thick_wall(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """Into a wall without end: the air keeps exp(r) erfc(sqrt(r)), r = t/tau, of a step's heat."""
+    """Conduction into an infinitely thick wall: the air keeps exp(r) erfc(sqrt(r)), r = t/tau, of a step's heat."""
     rate = np.geomspace(2e-3, 2e2, 22)
-    weight = np.sqrt(rate) / (1.0 + rate)  # of d ln(rate)
+    weight = np.sqrt(rate) / (1.0 + rate)  # density over ln(rate)
     return (
         amount
         * (HEAT_RATIO - 1.0)

@@ -1,4 +1,4 @@
-"""Loops that do not depend on rate."""
+"""Hidden effects: loops that do not depend on rate."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SLIDERS = 16
 
 
 def relays_and_sliders(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """A seat of relays over two thresholds (`simulators.plant.preisach`) on a wall of sliders."""
+    """A contact of relays over two thresholds (`simulators.plant.preisach`) on a wall of sliders."""
     from simulators.plant.load_stepping import loop_and_cycles
 
     shape, height = loop_shape(draws["half_width"], draws["spread"], 1.0)
@@ -30,7 +30,7 @@ def relays_and_sliders(amount: float, draws: Draws, f: Array, at: Surroundings) 
 
 
 def unequal_sliders(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Sliders that hold more one way than the other, their slip distances spread as a power law."""
+    """Sliders that hold more in one direction than in the other, with slip distances spread as a power law."""
     share = (np.arange(SLIDERS) + 0.5) / SLIDERS
     reach = draws["reach"] * share ** (1.0 / draws["spread"])
     up, down = reach * (1.0 + draws["uneven"]), reach * (1.0 - draws["uneven"])
@@ -40,14 +40,14 @@ def unequal_sliders(amount: float, draws: Draws, f: Array, at: Surroundings) -> 
 
 
 def anhysteretic(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Domains that follow their equilibrium late, pinned."""
+    """Pinned domains that follow their equilibrium with a lag (Jiles and Atherton)."""
     out = np.empty(f.size)
     jiles_atherton(np.ascontiguousarray(f), draws["pin"], draws["scale"], out)
     return np.asarray(f - amount * draws["scale"] / draws["pin"] * out)
 
 
 def intrinsic_time(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Plasticity without a yield point, by the length of the way gone."""
+    """Plasticity without a yield point, as a function of the length of the path travelled (endochronic)."""
     out = np.empty(f.size)
     endochronic(np.ascontiguousarray(f), draws["width"], draws["hardening"], out)
     return np.asarray(f - amount * out)

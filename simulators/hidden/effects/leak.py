@@ -1,4 +1,4 @@
-"""Air that leaves the tube."""
+"""Hidden effects: air that leaves the tube."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from simulators.hidden.effects._registry import Draws, Hideable, bladder, log_un
 from simulators.hidden.effects.operators import against_modes, integral
 from smartshoe.arrays import Array
 
-LAMINAR = 2e-3  # of full scale: below it every opening's flow is viscous
+LAMINAR = 2e-3  # of full scale: below this pressure the flow of any opening is viscous
 
 
 def forchheimer(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """p = A q + B q^2 through a packed bed: q at both pressures' signs."""
+    """Flow q through a packed bed, p = A q + B q^2, for either sign of the pressure."""
     inertia = draws["inertia"]
     flow = 2.0 * y / (1.0 + np.sqrt(1.0 + 4.0 * inertia * np.abs(y)))
     return -amount * integral(flow, at.step_s)
 
 
 def permeation(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """What a membrane takes in at its inner face: Fick's law, steady once it is soaked."""
+    """Uptake of a membrane at its inner face: Fick's law, steady once it is saturated."""
     number = np.arange(1.0, 7.0)
     rate = number**2 / draws["soak_s"]
     soaking = against_modes(y, at.step_s, rate, 2.0 * draws["uptake"] * np.ones(number.size))
@@ -28,14 +28,14 @@ def permeation(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array
 
 
 def labyrinth(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Chambers in a row: the root of the difference of squared absolute pressures."""
+    """Chambers in series: the square root of the difference of squared absolute pressures."""
     size = np.abs(y)
     drop = size * (1.0 + 0.5 * draws["compressed"] * size)
     return -amount * integral(np.sign(y) * drop / np.sqrt(drop + LAMINAR), at.step_s)
 
 
 def bubble_point(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A wetted hole: nothing below the pressure that blows the film away, then an orifice's root; inwards freely."""
+    """A wetted hole: closed below the pressure that blows the film away, then an orifice's root; open inwards."""
     over = np.where(y >= 0.0, np.maximum(y - draws["holds"], 0.0), -y)
     return -amount * integral(np.sign(y) * over / np.sqrt(over + LAMINAR), at.step_s)
 

@@ -1,4 +1,4 @@
-"""Noise beyond the white one, and spikes."""
+"""Hidden effects: noise beyond white noise, and spikes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from smartshoe.arrays import Array
 
 
 def alias_hz(frequency_hz: float, sample_rate_hz: float) -> float:
-    """Where a tone of ``frequency_hz`` comes out in a log at ``sample_rate_hz``."""
+    """The frequency in Hz at which a tone of ``frequency_hz`` appears in a log at ``sample_rate_hz``."""
     folded = frequency_hz % sample_rate_hz
     return min(folded, sample_rate_hz - folded)
 
@@ -29,13 +29,13 @@ def _mains(rng: np.random.Generator, subject: Subject) -> Draws:
 
 
 def wandering_mains(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A tone whose frequency wanders with the grid's load: a slow random walk of the phase."""
+    """A tone whose frequency varies with the grid's load: a slow random walk of the phase."""
     walk = np.cumsum(at.rng.standard_normal(y.size)) * np.sqrt(at.step_s) * draws["wander"]
     return np.asarray(y + amount * np.sin(2.0 * np.pi * (draws["hum_hz"] * at.time_s + at.rng.uniform()) + walk))
 
 
 def motor(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A tone that is there while a motor runs: two thirds of the time, in spells."""
+    """A tone present while a motor runs: two thirds of the time, in spells."""
     spell = np.floor(at.time_s / draws["spell_s"] + at.rng.uniform()).astype(int)
     runs = at.rng.random(int(spell[-1]) + 1 if spell.size else 1) < 0.67
     wave = np.sin(2.0 * np.pi * (draws["hum_hz"] * at.time_s + at.rng.uniform()))
@@ -43,7 +43,7 @@ def motor(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
 
 
 def rumble(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A broad band about one frequency: a building that is shaken, second order with a tenth to a half of damping."""
+    """A broad band about one frequency, like a shaking building: second order with a damping of a tenth to a half."""
     from scipy.signal import lfilter
 
     angle = 2.0 * np.pi * min(draws["rumble_hz"] * at.step_s, 0.3)
@@ -53,41 +53,41 @@ def rumble(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
 
 
 def averaged(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """White noise through a running mean: correlated up to its length and not beyond."""
+    """White noise through a running mean: correlated up to its length but not beyond."""
     width = max(2, round(draws["mean_s"] / at.step_s))
     total = np.cumsum(at.rng.standard_normal(y.size + width))
     return np.asarray(y + amount * (total[width:] - total[:-width]) / np.sqrt(width))
 
 
 def shot(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Variance in proportion to the reading."""
+    """White noise whose variance is proportional to the reading."""
     return np.asarray(y + amount * np.sqrt(np.abs(y)) * at.rng.standard_normal(y.size))
 
 
 def two_ranges(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """An amplifier that switches to a noisier range above one reading."""
+    """An amplifier that switches to a noisier range above a certain reading."""
     return np.asarray(y + amount * (np.abs(y) > draws["switch"]) * at.rng.standard_normal(y.size))
 
 
 def late_or_not(amount: float, draws: Draws, t: Array, at: Surroundings) -> Array:
-    """An interrupt that is now and then served late, about zero in the mean."""
+    """An interrupt that is sometimes served late; zero on average."""
     late = at.rng.random(t.size) < draws["share"]
     return np.asarray(amount * (late - draws["share"]) / np.sqrt(draws["share"] * (1.0 - draws["share"])))
 
 
 def queueing(amount: float, draws: Draws, t: Array, at: Surroundings) -> Array:
-    """Waiting times of a queue: exponential, about zero in the mean."""
+    """Waiting times of a queue: exponential; zero on average."""
     return np.asarray(amount * (at.rng.standard_exponential(t.size) - 1.0))
 
 
 def discharges(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Single samples, one side, sizes exponential."""
+    """Spikes of single samples to one side, with exponential sizes."""
     struck = at.rng.random(y.size) < draws["spike_share"]
     return np.asarray(y + draws["side"] * amount * struck * (0.3 + at.rng.standard_exponential(y.size)))
 
 
 def heavy_tail(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Single samples, either side, Student's t with three degrees of freedom, cut at four."""
+    """Spikes of single samples to either side, Student's t with three degrees of freedom, limited to four."""
     struck = at.rng.random(y.size) < draws["spike_share"]
     return np.asarray(y + amount * struck * np.clip(at.rng.standard_t(3.0, y.size), -4.0, 4.0))
 

@@ -1,4 +1,4 @@
-"""Memories that several laws need, compiled or vectorised; steps are even, signals start at rest."""
+"""Operators with memory that several laws need, compiled or vectorised; steps are even, signals start at rest."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from smartshoe.arrays import Array
 
 
 def integral(signal: Array, step_s: float) -> Array:
-    """Integral (n,) by the trapezoid rule, the signal being 0 before the first sample."""
+    """Integral (n,) by the trapezoid rule; the signal is 0 before the first sample."""
     before = np.concatenate([[0.0], signal[:-1]])
     return np.asarray(np.cumsum(0.5 * step_s * (signal + before)))
 
 
 def lagged(signal: Array, time_constant_s: float, step_s: float) -> Array:
-    """Through a first-order lag (n,), exact for a signal that is linear within a step."""
+    """The signal (n,) through a first-order lag, exact where it is linear within a step."""
     out = np.empty(signal.size)
     modes(signal, step_s, np.array([1.0 / time_constant_s]), np.array([1.0]), out)
     return signal - out
 
 
 def against_modes(signal: Array, step_s: float, rate: Array, weight: Array) -> Array:
-    """sum_j w_j (x - q_j) (n,) with q_j' = rate_j (x - q_j): what a row of arms holds, or heat that has not left."""
+    """sum_j w_j (x - q_j) (n,) with q_j' = rate_j (x - q_j): stress of Maxwell arms, or heat still in the gas."""
     out = np.empty(signal.size)
     modes(np.ascontiguousarray(signal), step_s, np.ascontiguousarray(rate), np.ascontiguousarray(weight), out)
     return out
@@ -32,7 +32,7 @@ def against_modes(signal: Array, step_s: float, rate: Array, weight: Array) -> A
 
 @njit(cache=True)
 def modes(signal: Array, step_s: float, rate: Array, weight: Array, out: Array) -> None:
-    """Fill ``out`` (n,) with sum_j w_j (x - q_j)."""
+    """Fill ``out`` (n,) with sum_j w_j (x - q_j), q_j' = rate_j (x - q_j); the compiled part of `against_modes`."""
     keep = np.exp(-rate * step_s)
     mean = -np.expm1(-rate * step_s) / (rate * step_s)
     q = np.zeros(rate.size)
@@ -51,7 +51,7 @@ def modes(signal: Array, step_s: float, rate: Array, weight: Array, out: Array) 
 def norton(signal: Array, step_s: float, time_constant_s: float, scale: float, power: float, out: Array) -> None:
     """Fill ``out`` (n,) with s = x - q, q' = scale/tau |s/scale|^power sgn s: an arm whose dashpot is a power law.
 
-    Implicit in the stress's secant, so that it is stable at any step.
+    Implicit, with the secant of the stress, so that it is stable at any step.
     """
     q, before = 0.0, 0.0
     for i in range(signal.size):
@@ -71,7 +71,7 @@ def norton(signal: Array, step_s: float, time_constant_s: float, scale: float, p
 
 @njit(cache=True)
 def slip(signal: Array, up: Array, down: Array, weight: Array, out: Array) -> None:
-    """Fill ``out`` (n,) with sum_j w_j z_j, springs behind sliders that give way at ``up`` and at -``down``."""
+    """Fill ``out`` (n,) with sum_j w_j z_j, springs behind sliders that slip at ``up`` and at -``down``."""
     z = np.zeros(weight.size)
     before = 0.0
     for i in range(signal.size):
@@ -88,7 +88,8 @@ def slip(signal: Array, up: Array, down: Array, weight: Array, out: Array) -> No
 def jiles_atherton(signal: Array, pin: float, scale: float, out: Array) -> None:
     """Fill ``out`` (n,) with the lag of m behind the anhysteretic a = tanh(x/scale): dm/dx = (a - m)/(pin sgn dx).
 
-    Never negative: where the anhysteretic lies on the far side the domains stay (Jiles and Atherton 1986, eq. 14).
+    The slope is never negative: where the anhysteretic lies on the other side, m does not change (Jiles and Atherton
+    1986, eq. 14).
     """
     m, before = 0.0, 0.0
     for i in range(signal.size):
@@ -106,7 +107,7 @@ def jiles_atherton(signal: Array, pin: float, scale: float, out: Array) -> None:
 
 @njit(cache=True)
 def endochronic(signal: Array, width: float, hardening: float, out: Array) -> None:
-    """Fill ``out`` (n,) with z, dz = dx/width - z |dx|/(width g), g = 1 + hardening ln(1 + way gone) (Valanis 1971)."""
+    """Fill ``out`` (n,) with z, dz = dx/width - z |dx|/(width g), g = 1 + hardening ln(1 + path) (Valanis 1971)."""
     z, before, gone = 0.0, 0.0, 0.0
     for i in range(signal.size):
         way = signal[i] - before
@@ -122,7 +123,7 @@ def endochronic(signal: Array, width: float, hardening: float, out: Array) -> No
 
 @njit(cache=True)
 def cycles_done(signal: Array, begins: float, ends: float, out: Array) -> None:
-    """Fill ``out`` (n,) with how many times the signal has come above ``begins`` and gone below ``ends``."""
+    """Fill ``out`` (n,) with how often the signal has risen above ``begins`` and then fallen below ``ends``."""
     inside, done = False, 0.0
     for i in range(signal.size):
         if signal[i] > begins:
@@ -135,7 +136,7 @@ def cycles_done(signal: Array, begins: float, ends: float, out: Array) -> None:
 
 @njit(cache=True)
 def opening_port(signal: Array, step_s: float, time_constant_s: float, opening: float, out: Array) -> None:
-    """Fill ``out`` (n,) with y' = (1 + opening |y|)(x - y)/tau: a port that the pressure widens."""
+    """Fill ``out`` (n,) with y, y' = (1 + opening |y|)(x - y)/tau: a port that the pressure widens."""
     y = 0.0
     before = 0.0
     for i in range(signal.size):

@@ -1,4 +1,4 @@
-"""What the catalogue does not have: the plain ones stand in `simulators.effects.outside`, the others here as laws."""
+"""Hidden effects that the catalogue lacks: the plain ones are in `simulators.effects.outside`, the others here."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def _wander(**given: Any) -> Options:
 
 
 def automatic_gain(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """An amplifier that turns itself down by the mean of the last seconds."""
+    """An amplifier that reduces its gain with the mean of the last seconds."""
     return np.asarray(y * (1.0 - amount * (lagged(np.abs(y), draws["mean_s"], at.step_s) - 0.3)))
 
 
 def slips(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """The unit slips on its seat at random moments, further the higher the load then is; slips add up and go back."""
+    """The unit slips on its seat at random moments, further at higher loads; slips accumulate and recover."""
     number, _, size = moments(at.time_s, draws["every_s"], at.rng)
     struck = np.flatnonzero(np.diff(number, prepend=number[0]) > 0)
     moved = np.zeros(y.size)
@@ -46,7 +46,7 @@ def slips(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
 
 
 def breathing(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A draught of pressure in the room through an open vent: rises and falls of their own length."""
+    """Pressure changes of the room, through an open vent: rises and falls of random length."""
     knots = at.rng.standard_normal(int(at.span_s / draws["breath_s"]) + 4)
     course = np.interp(at.time_s / draws["breath_s"], np.arange(knots.size), knots)
     return np.asarray(y + amount * (1.0 + y) * course)

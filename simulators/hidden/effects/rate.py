@@ -1,4 +1,4 @@
-"""Gain that grows with the rate of loading, both ways."""
+"""Hidden effects: gain that grows with the rate of loading, in both directions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def ree_eyring(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array
 
 
 def carreau(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """(1 + (v/v0)^2)^(n/2) - 1: nothing at first, then a power."""
+    """(1 + (v/v0)^2)^(n/2) - 1: zero at first, then a power."""
     v0, power = draws["v0"], draws["power"]
     gain = ((1.0 + (_speed(f, draws, at) / v0) ** 2) ** (0.5 * power) - 1.0) / ((1.0 + v0**-2) ** (0.5 * power) - 1.0)
     return np.asarray(f * np.maximum(1.0 + draws["sign"] * amount * gain, 0.0))
@@ -33,7 +33,7 @@ EFFECTS = [
         lambda a, d, s: bladder(contact={"rate_gain": a}), law="power",
         says="power 0.9 of the rate, seen through 20 ms",
         source="thickening of a visco-elastic cover", bends="load",
-        catalogue=lambda a, d, s, hz: {"gain_per_rate": a},  # at full scale a second
+        catalogue=lambda a, d, s, hz: {"gain_per_rate": a},  # at a rate of one full scale per second
         laws=(
             Law("ree_eyring", "load", "thermally activated flow: asinh of the rate", "Ree and Eyring 1955", ree_eyring,
                 0.03, 0.8, signed(uniform(v0=(0.15, 0.6), seen_s=(0.01, 0.03)))),

@@ -1,4 +1,4 @@
-"""Relaxation of the wall beyond the paper's one arm."""
+"""Hidden effects: relaxation of the wall beyond the paper's one arm."""
 
 from __future__ import annotations
 
@@ -10,27 +10,30 @@ from simulators.hidden.effects.operators import against_modes, norton
 from simulators.plant.bladder_parameters import X_OVER_NRT
 from smartshoe.arrays import Array
 
-SPECTRUM = 20  # modes of a continuous spectrum
+SPECTRUM = 20  # modes that approximate a continuous spectrum
 
 
 def second_time_constant(rng: np.random.Generator, subject: Subject) -> Draws:
-    """Well apart from the unit's own, slower in two of five."""
+    """Draws a time constant well separated from the unit's own, slower in two of five cases."""
     ratio = float(np.exp(rng.uniform(np.log(4.0), np.log(10.0))))
     slower = rng.random() < 0.4
     return {"time_constant_s": subject.time_constant_s * ratio if slower else subject.time_constant_s / ratio}
 
 
 def cole_davidson(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """(tau/(tau0 - tau))^gamma below tau0, nothing above; each mode's weight is the spectrum's integral about it."""
+    """Spectrum (tau/(tau0 - tau))^gamma below tau0, zero above.
+
+    Each mode's weight is the spectrum's integral about it.
+    """
     share = (np.arange(SPECTRUM) + 0.5) / SPECTRUM
-    # tau/tau0 = sin^2 of half an angle evens out the spectrum's singular end.
+    # tau/tau0 = sin^2 of half an angle removes the singularity at the spectrum's end.
     ratio = np.sin(0.5 * np.pi * share) ** 2 * 0.98 + 0.005
     weight = (ratio / (1.0 - ratio)) ** draws["gamma"] / ratio * np.sin(np.pi * share)
     return amount * against_modes(x, at.step_s, 1.0 / (draws["time_constant_s"] * ratio), weight / weight.sum())
 
 
 def power_dashpot(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """An arm whose dashpot flows with a power of its stress."""
+    """An arm whose dashpot flows as a power of its stress."""
     out = np.empty(x.size)
     norton(np.ascontiguousarray(x), at.step_s, draws["time_constant_s"], 0.3, draws["power"], out)
     return amount * out
@@ -49,7 +52,7 @@ def kohlrausch(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array
 
 
 def two_slopes(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """A spectrum that falls with one power of the time, beyond a crossover with another."""
+    """A spectrum that falls as one power of the time, and beyond a crossover as another."""
     tau_s = np.geomspace(0.02, 2e3, 24)
     ratio = tau_s / draws["crossover_s"]
     weight = np.where(ratio < 1.0, ratio ** -draws["short"], ratio ** -draws["long"])

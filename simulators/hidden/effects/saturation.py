@@ -1,4 +1,4 @@
-"""The end of the sensor's range."""
+"""Hidden effects: the end of the sensor's range."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from smartshoe.arrays import Array
 
 
 def _level(amount: float, draws: Draws) -> float:
-    """Where it begins, as a share of the full-scale reading; a soft knee bends before it is reached."""
+    """The level where saturation begins, as a share of the full-scale reading; a soft knee bends below it."""
     return (1.3 if draws["soft"] else 1.0) - amount
 
 
@@ -26,7 +26,7 @@ def logarithmic(amount: float, draws: Draws, y: Array, at: Surroundings) -> Arra
 
 
 def exponential(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Above a level the reading closes in on its end."""
+    """Above a level the reading approaches its end exponentially."""
     over = np.maximum(y - (1.0 - amount), 0.0)
     return np.asarray(y - over - draws["knee"] * np.expm1(-over / draws["knee"]))
 

@@ -1,4 +1,4 @@
-"""Softening by the largest load so far, and settling over cycles."""
+"""Hidden effects: softening by the largest load so far, and settling over cycles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from simulators.hidden.effects.operators import cycles_done
 from smartshoe.arrays import Array
 
 CYCLE_BEGINS, CYCLE_ENDS = 0.1, 0.03  # of full scale
-ROUNDED = 1e-3  # of the distance to the largest strain: where the root's slope would have no end
+ROUNDED = 1e-3  # of the distance to the largest strain: rounds the root's infinite slope
 
 
 def _largest(x: Array) -> Array:
@@ -18,13 +18,13 @@ def _largest(x: Array) -> Array:
 
 
 def damage(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """(1 - D) of the wall's force, D = a (1 - exp(-W/eta)), W the largest energy so far, the present one included."""
+    """The wall's force times 1 - D, D = a (1 - exp(-W/eta)), W the largest energy so far, including the present."""
     most = _largest(x)
     return np.asarray(-at.stiff / (1.0 + at.stiff) * x * amount * -np.expm1(-(most**2) / draws["eta"]))
 
 
 def root_of_distance(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """exp(-b sqrt(M - m)) of the wall's force, M the largest strength of strain so far and m the present one."""
+    """exp(-b sqrt(M - m)) times the wall's force; m is the strain's magnitude, M its largest value so far."""
     most = _largest(x)
     now = np.maximum(x, 0.0) ** draws["power"]
     distance = np.maximum(most ** draws["power"] - now, 0.0)
@@ -33,16 +33,16 @@ def root_of_distance(amount: float, draws: Draws, x: Array, at: Surroundings) ->
 
 
 def by_way(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Settles with the way that the load has gone up and down, not by counting."""
+    """Settles with the distance travelled by the load, up and down, rather than with the number of cycles."""
     gone = np.cumsum(np.abs(np.diff(f, prepend=0.0))) / 2.0
     return np.asarray(f * (1.0 - draws["sign"] * amount * np.expm1(-gone / draws["cycles"])))
 
 
 def by_power(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """1 - (1 + n)^-b of the cycles done: no end to it."""
+    """1 - (1 + n)^-b of the completed cycles n: it never ends."""
     done = np.empty(f.size)
     cycles_done(np.ascontiguousarray(f), CYCLE_BEGINS, CYCLE_ENDS, done)
-    # Smoothly, as the load comes back: a gain that jumped at rest would show nothing there anyway.
+    # The gain changes smoothly as the load returns; a jump at rest would not show there anyway.
     return np.asarray(f * (1.0 + draws["sign"] * amount * (1.0 - (1.0 + done) ** -draws["power"])))
 
 

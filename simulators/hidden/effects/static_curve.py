@@ -1,4 +1,4 @@
-"""Curves of reading against load: gas, wall, contact and sensor."""
+"""Hidden effects: curves of reading against load, from gas, wall, contact and sensor."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from simulators.plant.bladder_parameters import AMBIENT_PA
 from smartshoe.arrays import Array
 
 AMBIENT_MBAR = AMBIENT_PA / 100.0
-LOCKING = 0.95  # of a chain's length: beyond it the formula has no meaning
+LOCKING = 0.95  # of a chain's length: the formula is meaningless beyond
 
 
 # -- gas ---------------------------------------------------------------------------------------------------------------
@@ -32,7 +32,7 @@ def _boyle(amount: float, draws: Draws, subject: Subject) -> Options:
 
 
 def stadium(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """Volume that a round tube loses between plates grows with the square of the travel; the air obeys Boyle."""
+    """A round tube between plates loses volume as the square of the travel; the air obeys Boyle's law."""
     squeezed = np.maximum(x, 0.0)
     lost = (1.0 - amount) * squeezed + amount * squeezed**2 + np.minimum(x, 0.0) * (1.0 - amount)
     dense = draws["dense"] * amount
@@ -40,7 +40,7 @@ def stadium(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
 
 
 def adsorption(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """A lining takes up air, until it is full (Langmuir): the free part of x + its uptake at full scale."""
+    """A lining adsorbs air until it is saturated (Langmuir): the free part of x plus its uptake at full scale."""
     k = draws["affinity"]
     whole = x * (1.0 + amount / (1.0 + k))
     # y + amount y/(1 + k y) = whole, a quadratic in y.
@@ -50,20 +50,20 @@ def adsorption(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array
 
 # -- wall --------------------------------------------------------------------------------------------------------------
 def eight_chains(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """Chains of limited length, inverse Langevin by Cohen's approximant."""
+    """A wall of chains with limited length: the inverse Langevin function by Cohen's approximant."""
     stretch = np.minimum(amount * x * x, LOCKING)
     return at.stiff / (1.0 + at.stiff) * x * ((3.0 - stretch) / (3.0 * (1.0 - stretch)) - 1.0)
 
 
 def densifying(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """A cellular wall whose cells close: x^m/(1 - x/d)."""
+    """A cellular wall whose cells collapse: x^m/(1 - x/d)."""
     squeezed = np.minimum(np.maximum(x, 0.0), 0.9 * draws["closed"])
     return amount * squeezed ** draws["power"] / (1.0 - squeezed / draws["closed"])
 
 
 # -- contact -----------------------------------------------------------------------------------------------------------
 def archard(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Asperities on asperities: area as load^m, m from 1 down; linear below a small load."""
+    """Asperities on asperities: contact area as load^m, m from 1 down; linear below a small load."""
     low, power = draws["onset"], 1.0 - amount
     acting = ((np.maximum(f, 0.0) + low) ** power - low**power) / ((1.0 + low) ** power - low**power)
     return np.where(f > 0.0, acting, f)
@@ -82,12 +82,12 @@ def _curve(amount: float, draws: Draws, subject: Subject) -> Options:
 
 
 def loaded_divider(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A potentiometer with a load on its tap: y/(1 + a y (1 - y)); a either way."""
+    """A potentiometer with a load on its tap: y/(1 + a y (1 - y)), with a of either sign."""
     return np.asarray(y / (1.0 + draws["sign"] * amount * y * (1.0 - np.minimum(y, 1.3))))
 
 
 def interpolation(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A linearising table with too few knots: a sine between them."""
+    """A linearising table with too few knots: a sine between its knots."""
     turns = draws["turns"]
     return np.asarray(y + draws["sign"] * amount * np.sin(np.pi * turns * y) / (np.pi * turns))
 

@@ -1,4 +1,4 @@
-"""The reading late against the load."""
+"""Hidden effects: a reading that is late against the load."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ from smartshoe.arrays import Array
 
 
 def cole_cole(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """1/(1 + (s tau)^alpha): a port whose volumes are many; the spectrum is Cole and Cole's."""
+    """1/(1 + (s tau)^alpha): a port with many volumes, with the spectrum of Cole and Cole."""
     alpha = draws["alpha"]
     log_ratio = np.linspace(-5.0, 5.0, 21)
-    # Of d ln(tau): sin(pi alpha)/(cosh(alpha u) + cos(pi alpha)).
+    # Density over d ln(tau): sin(pi alpha)/(cosh(alpha u) + cos(pi alpha)).
     weight = np.sin(np.pi * alpha) / (np.cosh(alpha * log_ratio) + np.cos(np.pi * alpha))
     rate = np.minimum(np.exp(-log_ratio) / amount, 0.5 / at.step_s * 20.0)
     return np.asarray(y - against_modes(y, at.step_s, rate, weight / weight.sum()))
 
 
 def widening(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A port that the pressure widens: faster at high pressure."""
+    """A port that the pressure widens, and which is therefore faster at high pressure."""
     out = np.empty(y.size)
     opening_port(np.ascontiguousarray(y), at.step_s, amount, draws["opening"], out)
     return out
 
 
 def beating(amount: float, draws: Draws, t: Array, at: Surroundings) -> Array:
-    """Two clocks of nearly one rate: the delay beats about its mean."""
+    """Two clocks of nearly equal rate: the delay beats about its mean."""
     return np.asarray(amount * (1.0 + draws["depth"] * np.sin(2.0 * np.pi * (t / draws["period_s"] + draws["phase"]))))
 
 
 def catching_up(amount: float, draws: Draws, t: Array, at: Surroundings) -> Array:
-    """A buffer that is longer at first."""
+    """A buffer whose delay is longer at first."""
     return np.asarray(amount * (1.0 + draws["depth"] * np.exp(-t / draws["settles_s"])))
 
 
 def temperature_of_crystal(amount: float, draws: Draws, t: Array, at: Surroundings) -> Array:
-    """A rate error that grows in proportion to time about its mean: the delay is a parabola."""
+    """A clock rate error that grows linearly in time about its mean, so that the delay is a parabola."""
     share = t / at.span_s
     return np.asarray(draws["sign"] * amount * t * (1.0 + draws["bend"] * (share - 0.7)))
 
 
 def slipped_samples(amount: float, draws: Draws, t: Array, at: Surroundings) -> Array:
-    """A sample is lost or doubled whenever the clocks are one apart: a staircase."""
+    """A sample is lost or doubled whenever the clocks differ by one: the delay is a staircase."""
     step_s = draws["slip_s"]
     return np.asarray(draws["sign"] * step_s * np.floor(amount * t / step_s + 0.5))
 

@@ -1,4 +1,4 @@
-"""The reading's zero: offset, drift, warm-up, permanent set."""
+"""Hidden effects: the reading's zero, by offset, drift, warm-up and permanent set."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from simulators.hidden.effects.operators import integral
 from simulators.plant.bladder_parameters import X_OVER_NRT
 from smartshoe.arrays import Array
 
-PER_KELVIN = 50.0  # a coefficient per kelvin for one per second: warming is slow
+PER_KELVIN = 50.0  # converts a coefficient per second to one per kelvin: warming is slow
 ROOM = {"logged": True, "warming_k": 4.0, "warming_time_constant_s": 90.0, "swing_k": 1.0, "swing_period_s": 83.0}
-TOUCHED = 0.05  # of full scale: the first load of a session
+TOUCHED = 0.05  # of full scale: threshold of the first load of a session
 
 
 def by_temperature(rng: np.random.Generator, subject: Subject) -> Draws:
-    """A sign, and whether it is the room's temperature rather than the clock."""
+    """Draws a sign, and whether the drift follows the room's temperature instead of the time."""
     return {"sign": float(rng.choice([-1.0, 1.0])), "by_temperature": float(rng.random() < 0.4)}
 
 
@@ -59,7 +59,7 @@ def _set_catalogue(amount: float, draws: Draws, subject: Subject, hz: float) -> 
 
 
 def seated(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """An offset of which a part goes with the session's first load."""
+    """An offset that partly disappears with the session's first load."""
     touched = np.maximum.accumulate(np.asarray(at.load > TOUCHED, dtype=float))
     return np.asarray(y + draws["sign"] * amount * (1.0 - draws["part"] * touched))
 
@@ -70,18 +70,18 @@ def file_by_file(amount: float, draws: Draws, y: Array, at: Surroundings) -> Arr
 
 
 def moisture(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Uptake of moisture by diffusion: the root of time."""
+    """Uptake of moisture by diffusion: the square root of time."""
     return np.asarray(y + draws["sign"] * amount * np.sqrt(at.time_s / 100.0))
 
 
 def accelerating(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """A parabola: a line that bends."""
+    """A parabola in time: a drift that speeds up."""
     share = at.time_s / 300.0
     return np.asarray(y + draws["sign"] * amount * share * (1.0 + draws["bend"] * share))
 
 
 def slab_warming(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """Heat through a slab: all odd modes."""
+    """Heat conduction through a slab, with all odd modes."""
     odd = np.array([1.0, 3.0, 5.0, 7.0, 9.0])
     share = 1.0 / odd**2
     left = np.exp(-np.outer(at.time_s / draws["time_constant_s"], odd**2)) @ (share / share.sum())
@@ -89,20 +89,20 @@ def slab_warming(amount: float, draws: Draws, y: Array, at: Surroundings) -> Arr
 
 
 def stretched(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
-    """1 - exp(-(t/tau)^beta)."""
+    """A stretched exponential in time, 1 - exp(-(t/tau)^beta)."""
     slow = (at.time_s / draws["time_constant_s"]) ** draws["beta"]
     return np.asarray(y - draws["sign"] * amount * np.expm1(-slow))
 
 
 def log_dose(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """The wall's place moves with the logarithm of the dose of load."""
+    """The wall's rest position moves with the logarithm of the load dose."""
     dose = integral(np.maximum(at.load, 0.0), at.step_s)
     moved = draws["early_s"] * np.log1p(dose / draws["early_s"])
     return np.asarray(-at.stiff / (1.0 + at.stiff) * amount * moved)
 
 
 def ratchet(amount: float, draws: Draws, x: Array, at: Surroundings) -> Array:
-    """The wall's place moves while the load grows, with a power of it: by strokes, not by time."""
+    """The wall's rest position moves while the load grows, as a power of it: by strokes, not by time."""
     f = np.maximum(at.load, 0.0)
     grown = np.maximum(np.diff(f, prepend=0.0), 0.0)
     return np.asarray(-at.stiff / (1.0 + at.stiff) * amount * np.cumsum(grown * f ** draws["power"]))

@@ -1,4 +1,4 @@
-"""What every estimator gives: force with its standard deviation; and what the calibration alone contributes to it."""
+"""The interface of all estimators: force with its standard deviation, including the calibration's own uncertainty."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class ForceEstimate:
     """``force_n`` (n,) in N, compression positive, and its standard deviation ``sd_n`` (n,) in N.
 
-    The standard deviation has the reading's noise in it and the calibration's own uncertainty; it knows nothing of
-    what the model leaves out (friction, leaks, drift).
+    The standard deviation covers the reading's noise and the calibration's own uncertainty, but not what the model
+    leaves out (friction, leaks, drift).
     """
 
     force_n: Array
@@ -29,22 +29,22 @@ class ForceEstimate:
 
 
 class ForceRun(ABC):
-    """An estimator under way: readings (n,) in, block after block, forces out, those of the last ones maybe later."""
+    """A running estimator: takes readings block by block, returns forces, possibly with a delay."""
 
     @abstractmethod
     def push(self, readings: Array, missing: Mask) -> ForceEstimate:
-        """The forces that the next readings make known; by the reading's noise alone their error bars."""
+        """The forces that these readings complete; their error bars cover the reading's noise only."""
 
     def finish(self) -> ForceEstimate:
-        """The forces that the end of the readings makes known: none, where none wait."""
+        """The remaining forces at the end of the readings; empty where none are pending."""
         return ForceEstimate(np.zeros(0), np.zeros(0))
 
 
 class Estimator(ABC):
-    """Readings of one unit, evenly sampled, to force with an error bar. Missing readings are a mask, never NaN.
+    """Force with an error bar from evenly sampled readings of one unit. Missing readings are a mask, never NaN.
 
-    A kind of estimator writes `begin` and the run that it gives; a whole signal and a stream are the same run.
-    ``noise_sd`` in the reading's unit is found from the readings where it is None.
+    Subclasses write `begin` and the run it returns; whole signals and streams use the same run. ``noise_sd``, in the
+    reading's unit, is estimated from the readings where it is None.
     """
 
     def __init__(self, calibration: Calibration, sample_rate_hz: float, *, noise_sd: float | None = None) -> None:
@@ -53,8 +53,8 @@ class Estimator(ABC):
     def estimate(self, readings: ArrayLike, missing: Mask | None = None) -> ForceEstimate:
         """Force of the whole signal ``readings`` (n,) in the calibration's reading unit; ``missing`` (n,) is bool.
 
-        Raises `InputError` for another shape, for a mask of another length and for readings that are not finite
-        where the mask says they are there.
+        Raises `InputError` for another shape, for a mask of another length, and for readings that are not finite
+        although the mask does not mark them as missing.
         """
         values = np.asarray(readings, dtype=float)
         if values.ndim != 1 or values.size == 0:
@@ -75,11 +75,14 @@ class Estimator(ABC):
 
     @abstractmethod
     def begin(self, readings: Array, missing: Mask) -> ForceRun:
-        """A run from a fresh start; what it must know of noise and load is found from these readings (n,)."""
+        """A run in its initial state.
+
+        Noise and load statistics that it needs are estimated from these readings (n,).
+        """
 
 
 def gain_sd(calibration: Calibration) -> float:
-    """The standard deviation of the static gain b1/a1 over the gain; 0 where the covariance is not known."""
+    """Relative standard deviation of the static gain b1/a1; 0 where the covariance is not known."""
     names = list(calibration.parameters)
     if not calibration.covariance or not {"a1", "b1"} <= set(names) or calibration.b1 == 0.0:
         return 0.0

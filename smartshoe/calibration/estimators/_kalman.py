@@ -1,4 +1,4 @@
-"""What the Kalman filters of a unit share, streaming and smoothed; the filters are filterpy's."""
+"""The common base of a unit's Kalman filters, streaming and smoothed; the filters themselves are filterpy's."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 
 UNKNOWN_N = 1e3  # sd of the first load
 UNKNOWN_N_PER_S = 1e4
-UNSETTLED = 0.1  # of the largest load: sd of what the solid has not yet followed of the first load
-MOST_DELAY_S = 0.01  # of a sensor, its hose and its converter
+UNSETTLED = 0.1  # of the largest load: sd of the solid's initial distance from equilibrium
+MOST_DELAY_S = 0.01  # that a sensor, its hose and its converter may cause
 LEAST_NOISE = 1e-6  # of the signal: without any noise a Kalman filter has no gain to compute
 
 
 def filter_of(model: StateSpace, calibration: Calibration, first: float, largest: float) -> Any:
-    """A filterpy ``KalmanFilter`` of ``model`` before its ``first`` reading; this and the ``largest`` less the offset.
+    """A filterpy ``KalmanFilter`` of ``model`` in its initial state.
 
-    The solid is near rest under an unknown first load: its strain is that load within `UNSETTLED` of the largest.
+    ``first`` and ``largest`` reading are less the offset. The solid starts near equilibrium under an unknown first
+    load: its strain equals that load within `UNSETTLED` of the largest load.
     """
     from filterpy.kalman import KalmanFilter
 
@@ -48,11 +49,11 @@ def filter_of(model: StateSpace, calibration: Calibration, first: float, largest
 
 
 class KalmanEstimator(Estimator):
-    """Estimators over the state of `smartshoe.calibration.estimators._state_space`.
+    """The common base of estimators over the state of `smartshoe.calibration.estimators._state_space`.
 
-    The reading's noise and the spectral ``density`` of the load's random walk in N²/s³ are found from the readings
-    where they are None. A missing reading is a step without an update: the error bar grows. The delay that the
-    calibration found between load and reading is undone (`ahead`), which the paper's filter leaves in.
+    The reading's noise and the spectral ``density`` of the load's random walk in N²/s³ are estimated from the readings
+    where they are None. A missing reading is a step without an update, so the error bar grows. Unlike in the paper's
+    filter, the delay that the calibration found between load and reading is compensated (`ahead`).
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class KalmanEstimator(Estimator):
         self._density = density
 
     def begin(self, readings: Array, missing: Mask) -> ForceRun:
-        """The filters' run; noise, density and largest reading are those of these readings."""
+        """A run of the filters; noise, density and largest reading are estimated from these readings."""
         values = straight(readings, missing) - self.calibration.offset
         largest = float(np.max(np.abs(values)))
         least = LEAST_NOISE * largest or LEAST_NOISE
@@ -82,10 +83,10 @@ class KalmanEstimator(Estimator):
 
 
 class KalmanRun(ForceRun):
-    """The Kalman filter of ``model`` under way, and, with ``lag`` samples of patience, its smoother.
+    """A running Kalman filter of ``model``; with ``lag`` samples, also its smoother.
 
-    Smoothed is what is in hand, from the last sample backwards (Rauch, Tung and Striebel 1965); a force leaves once
-    ``lag`` readings after it are known.
+    The smoother runs backwards over the stored samples (Rauch, Tung and Striebel 1965); a force is given out once
+    ``lag`` later readings are known.
     """
 
     def __init__(self, model: StateSpace, calibration: Calibration, largest: float, lag: int | None = None) -> None:
@@ -94,7 +95,7 @@ class KalmanRun(ForceRun):
         self._held = (np.zeros((0, 3, 1)), np.zeros((0, 3, 3)))
 
     def push(self, readings: Array, missing: Mask) -> ForceEstimate:
-        """The forces that are known with the next readings."""
+        """The forces that become known with these readings."""
         if readings.size:
             values = straight(readings, missing) - self._calibration.offset
             if self._filter is None:
@@ -107,14 +108,14 @@ class KalmanRun(ForceRun):
         return self._estimated(0 if self._lag is None else self._lag)
 
     def finish(self) -> ForceEstimate:
-        """The forces that wait for readings after them."""
+        """The forces that are still waiting for later readings."""
         return self._estimated(0)
 
     def _estimated(self, waiting: int) -> ForceEstimate:
         means, covariances = self._held
         count = max(len(means) - waiting, 0)
         if self._lag is not None and count:
-            # filterpy steps back with the transition of each sample: the same one everywhere.
+            # filterpy's smoother takes the transition of each sample, which is the same for all.
             means, covariances, _, _ = self._filter.rts_smoother(means, covariances)
         self._held = (self._held[0][count:], self._held[1][count:])
         look = ahead(self._calibration)
@@ -123,16 +124,16 @@ class KalmanRun(ForceRun):
 
 
 def straight(readings: Array, missing: Mask) -> Array:
-    """Readings (n,) with straight lines over what is missing; zeros where nothing is there."""
+    """Readings (n,) with missing samples interpolated linearly; zeros where all are missing."""
     at = np.arange(readings.size)
     return np.interp(at, at[~missing], readings[~missing]) if not missing.all() else np.zeros(readings.size)
 
 
 def ahead(calibration: Calibration) -> Array:
-    """The row (3,) by which a state gives the load now, where the reading comes late by the calibration's delay.
+    """The row (3,) that gives the present load from a state, where the reading lags by the calibration's delay.
 
-    The state is the load that the reading shows; its rate tells what came since. A delay of more than `MOST_DELAY_S`
-    is no sensor's but that of two clocks at the calibration, and is left alone.
+    The state is the load that the reading shows; its rate extrapolates to the present. A delay of more than
+    `MOST_DELAY_S` is not the sensor's but that of two clocks during the calibration, and is ignored.
     """
     look = np.zeros(3)
     look[LOAD] = 1.0

@@ -1,4 +1,4 @@
-"""The noise of a reading, from the reading alone."""
+"""Estimates the noise of a reading from the reading alone."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ ROUNDS = 20
 def reading_noise_sd(readings: Array, missing: Mask | None = None) -> float:
     """The standard deviation of white noise on ``readings`` (n,), in their unit, at least that of its quantisation.
 
-    Second differences take a level and a slope out; of short blocks those count that differ by no
-    more than noise does, from the calmest fifth on. Quantisation by steps of d is a noise of d/sqrt(12).
+    Second differences remove level and slope. Of short blocks, the calmest fifth is used, and further blocks whose
+    differences are no larger than noise explains. Quantisation with step d is a noise of d/sqrt(12).
     """
     there = readings if missing is None else readings[~missing]
     steps = np.abs(np.diff(there))

@@ -1,9 +1,9 @@
-"""The unit and the load on it as a state: what the Kalman filters share.
+"""The unit and the load on it as a state-space model, which the Kalman filters share.
 
 The state is (load F in N, its rate in N/s, the solid's slow strain w in N). The reading follows from Chinimilli 2016
-(13), turned round: reading = offset + F/b0 + (a1/b1 - 1/b0) w with w' = (b1/b0) (F - w). The load's rate is
-integrated white noise of spectral density q in N²/s³ (a "nearly constant rate", Bar-Shalom, Li and Kirubarajan 2001,
-section 6.2.2); nothing is assumed of feet.
+(13), inverted: reading = offset + F/b0 + (a1/b1 - 1/b0) w with w' = (b1/b0) (F - w). The load's rate is integrated
+white noise of spectral density q in N²/s³ (a "nearly constant rate", Bar-Shalom, Li and Kirubarajan 2001, section
+6.2.2); nothing is assumed about feet.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LEAST_DENSITY, MOST_DENSITY = 1e2, 1e11  # N²/s³: a slow sway, and a load that
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:
-    """x' = F x + noise of covariance Q a step; reading - offset = H x + noise of variance R."""
+    """x' = F x + noise of covariance Q per step; reading - offset = H x + noise of variance R."""
 
     transition: Array
     process: Array
@@ -35,7 +35,7 @@ class StateSpace:
 
 
 def contact_model(calibration: Calibration, sample_rate_hz: float, density: float, noise_sd: float) -> StateSpace:
-    """A load whose rate is a random walk of ``density`` in N²/s³; ``noise_sd`` in the reading's unit."""
+    """A load whose rate is a random walk of ``density`` in N²/s³; ``noise_sd`` is in the reading's unit."""
     flow = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     return _discretised(calibration, sample_rate_hz, flow, np.array([[0.0], [np.sqrt(density)], [0.0]]), noise_sd)
 
@@ -43,7 +43,7 @@ def contact_model(calibration: Calibration, sample_rate_hz: float, density: floa
 def swing_model(
     calibration: Calibration, sample_rate_hz: float, residual_n: float, time_s: float, noise_sd: float
 ) -> StateSpace:
-    """A load that falls to zero within ``time_s`` and stays about it with a standard deviation of ``residual_n``."""
+    """A load that decays to zero within ``time_s`` and then has a standard deviation of ``residual_n``."""
     flow = np.array([[-1.0 / time_s, 0.0, 0.0], [0.0, -1.0 / time_s, 0.0], [0.0, 0.0, 0.0]])
     drive = np.sqrt(2.0 / time_s) * residual_n
     return _discretised(calibration, sample_rate_hz, flow, np.array([[drive], [0.0], [0.0]]), noise_sd)
@@ -70,7 +70,8 @@ def _discretised(
 def likely_density(calibration: Calibration, sample_rate_hz: float, readings: Array, noise_sd: float) -> float:
     """The spectral density in N²/s³ under which ``readings`` (n,) less their offset are most likely.
 
-    By the innovations of the steady filter, of which each density has one; a grid of decades, then Brent's method.
+    Each density has a steady-state filter, whose innovations give the likelihood; maximised on a grid of decades, then
+    by Brent's method.
     """
     from scipy.optimize import minimize_scalar
 
@@ -92,7 +93,7 @@ def likely_density(calibration: Calibration, sample_rate_hz: float, readings: Ar
 
 
 def _steady_innovations(model: StateSpace, readings: Array) -> tuple[Array, float]:
-    """Innovations (n,) of the steady filter and their variance: one recursive filter of third order."""
+    """Innovations (n,) of the steady-state filter and their variance, by one recursive filter of third order."""
     from scipy.linalg import solve_discrete_are
     from scipy.signal import lfilter, ss2tf
 

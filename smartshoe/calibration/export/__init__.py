@@ -1,7 +1,7 @@
-"""A calibration's filter for firmware and other tools: C99, MATLAB/Octave, JSON, FMI 3.0 (`fmu`).
+"""Exports a calibration's filter for firmware and other tools: C99, MATLAB/Octave, JSON, FMI 3.0 (`fmu`).
 
-A target is a function that takes a `FilterModel` and gives its files; the model's ``kind`` names the templates, so a
-further kind of model is a further `FilterModel` and its templates, and no change here.
+A target is a function from a `FilterModel` to its files. The model's ``kind`` names the templates, so a new kind of
+model needs a new `FilterModel` and its templates, but no change here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Files = Mapping[str, str | bytes]
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """What the C code computes in; ``apart`` puts its self-tests into a folder of their own."""
+    """The arithmetic of the C code; ``apart`` puts its self-tests into a folder of their own."""
 
     precision: str = "double"
     fixed: str | None = None
@@ -55,11 +55,11 @@ def export_files(
     fixed: str | None = None,
     name: str = DEFAULT_NAME,
 ) -> Files:
-    """File name to text of ``calibration``'s filter for target ``to``, at its own rate where none is given.
+    """The files (name to text) of ``calibration``'s filter for target ``to``, by default at the calibration's rate.
 
-    ``precision`` is that of the C code, ``fixed`` ("q15", "q31") its integer arithmetic in place of it; ``name`` is
-    that of its files and symbols. Raises `UsageError` for an unknown target or arithmetic, for a name that is no C
-    identifier, and for a rate that is not positive or too high for the filter to be written in double precision.
+    ``precision`` is that of the C code; ``fixed`` ("q15", "q31") selects integer arithmetic instead; ``name`` is that
+    of files and symbols. Raises `UsageError` for an unknown target or arithmetic, for a name that is no C identifier,
+    and for a rate that is not positive or too high for the filter to be written in double precision.
     """
     return export_shoe(
         [calibration], to, sample_rate_hz=sample_rate_hz, precision=precision, fixed=fixed, names=[name]
@@ -75,11 +75,11 @@ def export_shoe(
     fixed: str | None = None,
     names: Sequence[str] = (),
 ) -> Files:
-    """As `export_files`, for several units whose C links into one program: file name to text.
+    """Like `export_files`, for several units whose C code links into one program: file name to text.
 
-    ``names``: a name each, or one that goes before the units' names, or none: then the units' names (of a single
-    calibration: ``smartshoe_filter``). Several units' self-tests are in the folder ``self_test``. Raises `UsageError`
-    for two names alike too.
+    ``names``: one name per unit, or one prefix for the units' names, or none: then the units' names (for a single
+    calibration ``smartshoe_filter``). The self-tests of several units are in the folder ``self_test``. Also raises
+    `UsageError` for two equal names.
     """
     if to not in _TARGETS:
         raise UsageError(f"target {to!r} is not known: use {', '.join(TARGETS[:-1])} or {TARGETS[-1]}")
@@ -104,8 +104,8 @@ def export_twins(
 ) -> Files:
     """The units themselves as FMI 3.0 units, load in and reading out: file name to bytes.
 
-    ``names`` as for `export_shoe`, the default ``smartshoe_twin``. Raises `UsageError` for an effect that is not
-    written forward, `InputError` for coefficients that are no passive solid.
+    ``names`` as for `export_shoe`, by default ``smartshoe_twin``. Raises `UsageError` for an effect that cannot be
+    exported forward, `InputError` for coefficients that do not describe a passive solid.
     """
     found: dict[str, str | bytes] = {}
     for calibration, name in zip(calibrations, names_of(calibrations, names, TWIN_NAME), strict=True):
@@ -115,9 +115,9 @@ def export_twins(
 
 
 def write_files(files: Mapping[str, str | bytes], folder: Path | str, *, force: bool = False) -> list[Path]:
-    """Write ``files`` (name to text or bytes) into ``folder``, made where it is missing: all of them or none.
+    """Write ``files`` (name to text or bytes) into ``folder``, created where it is missing: all of them or none.
 
-    Raises `UsageError` naming a file that is there already, unless ``force`` allows it to be replaced.
+    Raises `UsageError` naming a file that already exists, unless ``force`` allows replacing it.
     """
     paths = [Path(folder) / name for name in files]
     there = [path for path in paths if path.is_file()]
@@ -128,7 +128,7 @@ def write_files(files: Mapping[str, str | bytes], folder: Path | str, *, force: 
         make_folder(place)
     with ExitStack() as stack:
         for path, content in zip(paths, files.values(), strict=True):
-            # Text as it is: no line ending of the platform's.
+            # Text is written unchanged, without the platform's line endings.
             stack.enter_context(replacing(path)).write_bytes(content.encode() if isinstance(content, str) else content)
     return paths
 

@@ -20,13 +20,13 @@ Files = dict[str, str]
 
 
 def c_files(model: FilterModel, precision: str = "double", fixed: str | None = None, *, apart: bool = False) -> Files:
-    """NAME.h and .c, a self-test's main and the test vector, file name to text, with the model's name.
+    """NAME.h and NAME.c, a self-test's main and the test vector: file name to text.
 
-    In ``double`` the code runs the recursion of `Compensator`, rounding and all. In ``float`` it runs direct term
-    plus state: the slow part has coefficients of its own, which single precision holds to seven digits, where
-    1 + den1 would keep four, and what each sum rounds away is carried to the next. ``fixed`` ("q15", "q31") is
-    `FixedPoint`. ``apart`` puts the test into a folder of its own, so that all the C files of the folder link into
-    one program. Raises `UsageError` where a coefficient is beyond what the arithmetic holds.
+    In ``double`` the code runs the recursion of `Compensator`, with the same rounding. In ``float`` it runs direct term
+    plus state: the slow part has coefficients of its own, which single precision holds to seven digits, where 1 + den1
+    would keep four, and the rounding error of each sum is carried to the next. ``fixed`` ("q15", "q31") selects
+    `FixedPoint`. ``apart`` puts the test into a folder of its own, so that all C files of the folder link into one
+    program. Raises `UsageError` where a coefficient exceeds the range of the arithmetic.
     """
     if fixed is not None:
         return _fixed(model, fixed, apart)
@@ -57,7 +57,7 @@ def _files(model: FilterModel, kind: str, apart: bool, *, vector: str, **values:
 
 
 def _floating(model: FilterModel, precision: str) -> dict[str, Any]:
-    """What the templates of double and float share."""
+    """Template values shared by double and float."""
     readings = [
         finite_or(value, "NAN", "INFINITY", "" if not np.isfinite(value) else _literal(value, precision, "reading"))
         for value in model.test_readings.tolist()
@@ -91,7 +91,7 @@ def _fixed(model: FilterModel, fixed: str, apart: bool) -> Files:
 
 
 def _integers(model: FilterModel, found: IntegerFilter, states: list[tuple[str, str]]) -> dict[str, Any]:
-    """What the templates of fixed point share."""
+    """Template values shared by the fixed-point kinds."""
     vector = FixedVector(model, found)
     low, high = -found.most - 1, found.most
     columns = {
@@ -121,13 +121,13 @@ def _integers(model: FilterModel, found: IntegerFilter, states: list[tuple[str, 
 
 
 def _rounded_up(value: float) -> float:
-    """``value`` to three digits, upwards."""
+    """``value`` rounded up to three digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
     return float(f"{math.ceil(value / unit) * unit:.3g}")
 
 
 def _counted(chain: IntegerChain) -> dict[str, Any]:
-    """What the templates of a chain in integers share."""
+    """Template values of a chain in integers."""
     return {
         "chain": chain,
         "blocks": described(chain.blocks),
@@ -136,7 +136,7 @@ def _counted(chain: IntegerChain) -> dict[str, Any]:
 
 
 def _steep(model: ExtendedFilterModel) -> dict[str, Any]:
-    """What the template needs where blocks are so steep that floats between them would lose too much."""
+    """Template values where blocks are so steep that floats between them would lose too much."""
     chain = IntegerChain.of(model.filter)
     factor, above = chain.entry
     return {
@@ -153,7 +153,7 @@ def _steep(model: ExtendedFilterModel) -> dict[str, Any]:
 
 
 def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, Any]:
-    """What the templates of the extended filter need beside the shared values."""
+    """Template values of the extended filter, beside the shared ones."""
     filter_ = model.filter
     single = precision == "float"
     blocks = filter_.c_steps(single=single)

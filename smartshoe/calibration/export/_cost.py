@@ -1,4 +1,4 @@
-"""Memory and operations of exported C, counted in the very text that is written."""
+"""Memory and operations of exported C code, counted in the generated text itself."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _CALLS = re.compile(rf"(?:{FUNCTIONS})f?\(")
 
 
 def state_bytes(header: str) -> int:
-    """Size in bytes of the struct in ``header``, with the padding that natural alignment brings."""
+    """Size in bytes of the struct in ``header``, including the padding of natural alignment."""
     (body,) = re.findall(r"typedef struct \w+ \{(.*?)\} \w+;", header, re.DOTALL)
     sizes = [_SIZES[kind] for kind in re.findall(rf"^ *({_TYPES}) \w+;", body, re.MULTILINE)]
     at = 0
@@ -47,9 +47,9 @@ def table_bytes(source: str) -> int:
 
 
 def operations(source: str) -> Counter[str]:
-    """What one push costs at most: every branch taken, every loop to its end; kind to count.
+    """Number of operations by kind of one push in the worst case: every branch taken, every loop to its end.
 
-    All functions of ``source`` but its init run once a push, as the templates have it; a function that is called by
+    All functions of ``source`` except its init run once per push, as the templates call them; a function called by
     another is counted at each call.
     """
     text = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
@@ -82,7 +82,7 @@ def _of(name: str, bodies: dict[str, str]) -> Counter[str]:
 
 
 def cost_lines(header: str, source: str) -> dict[str, str]:
-    """What the header says of memory and operations, key to one line."""
+    """The header's statements about memory and operations, key to one line."""
     counted = operations(source)
     said = ", ".join(f"{counted[kind]} {kind}" for kind in dict.fromkeys((*_KINDS.values(), "library calls"))
                      if counted[kind])  # fmt: skip

@@ -1,4 +1,4 @@
-"""The extended filter in integer arithmetic: scaling, what its error may be, and the C of its blocks."""
+"""The extended filter in integer arithmetic: its scaling, its error bound, and the C code of its blocks."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import CStep
 
 FRACTION = 46
-"""Bits after the point of a share of full scale inside the chain."""
-FRACTION_WITH_TIME = 40  # six days of seconds fit beside it
+"""Fractional bits of a share of full scale inside the chain."""
+FRACTION_WITH_TIME = 40  # leaves room for six days in seconds
 WIDEST = 64  # full scales that a signal may reach between two blocks
 RUN = 20_000
-"""Samples after the start for which the bound is stated: what is summed up drifts by its rounding."""
+"""Samples after the start for which the bound holds: running sums drift by their rounding."""
 ROUNDINGS_A_BLOCK = 200
-ROUNDINGS_A_SAMPLE = 4  # of a sum that never forgets
-MOVED = 24  # places of the test readings at which one reading is moved
+ROUNDINGS_A_SAMPLE = 4  # of a sum over the whole session
+MOVED = 24  # positions in the test readings at which a single reading is moved
 WALK = 4000  # samples of a walk on which all readings are moved at once
-DRAWS = 6  # of which are moved up and which down
-DITHER = 0.001  # standard deviation of the readings' noise meanwhile, of their span
+DRAWS = 6  # random choices of which readings move up and which down
+DITHER = 0.001  # standard deviation of noise added to these readings, of their span
 MARGIN = 2.0
-"""Of what was measured at these places, for the places that were not tried."""
+"""Factor on the measured error, for the positions that were not tried."""
 
 
 Forces = Callable[[Array], Array]
@@ -48,12 +48,13 @@ Forces = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class IntegerChain:
-    """The blocks of an extended filter in C of integers: a share of full scale counts 2^-``fraction`` in 64 bits.
+    """The blocks of an extended filter in integer C: full scale is 2^``fraction`` counts of 64 bits.
 
-    ``clock`` is (start, step, last): the time in counts at the first sample and between two, and the sample at which
-    it stands still; None where no block reads it. ``functions`` is the C of the arithmetic that ``blocks`` call, and
-    ``widest`` the largest count between two of them. ``entry`` and ``leaving`` are (factor, exponent): full scales are
-    the power of two above them times the factor, upwards of 1 for readings and downwards for forces.
+    ``clock`` is (start, step, last): the time in counts at the first sample, its step, and the sample at which it
+    stops; None where no block reads it. ``functions`` is the C code of the arithmetic that ``blocks`` call, and
+    ``widest`` the largest count between two blocks. ``entry`` and ``leaving`` are (factor, exponent), with 2^exponent
+    the power of two above full scale: the entry's factor is 2^exponent over the full-scale reading (at least 1), the
+    leaving one the full-scale load over 2^exponent (at most 1).
     """
 
     fraction: int
@@ -66,9 +67,9 @@ class IntegerChain:
 
     @classmethod
     def of(cls, filter_: ExtendedCompensator, ends: Set[str] = frozenset()) -> IntegerChain:
-        """The chain of ``filter_`` from its start; raises `UsageError` for C that has no integer form.
+        """The chain of ``filter_`` in its initial state; raises `UsageError` for C code that has no integer form.
 
-        ``ends``: functions by which integers come in and go out; none where these are floats.
+        ``ends``: names of the functions that convert integers at input and output; none where these are floats.
         """
         steps = filter_.c_steps(single=True)
         timed = any(reads_time(step.body) for _, step in steps)
@@ -88,7 +89,7 @@ class IntegerChain:
 
     @property
     def roundings(self) -> float:
-        """How far its integers may be off, a share of full scale, where no block raises that."""
+        """Bound on the rounding error of its integers, as a share of full scale, where no block amplifies it."""
         summed = ROUNDINGS_A_SAMPLE * RUN if any(step.states for _, step in self.blocks) else 0
         return float((ROUNDINGS_A_BLOCK * len(self.blocks) + summed) * 2.0**-self.fraction)
 
@@ -96,7 +97,7 @@ class IntegerChain:
 def _in_integers(to: IntegerC, name: str, step: CStep) -> CStep:
     try:
         return to.step(step)
-    except ValueError as error:  # of an effect from another package
+    except ValueError as error:  # raised for the code of an effect from another package
         raise UsageError(
             f"block {name} is written in C that has no integer form ({error}): export in --precision double"
         ) from error
@@ -104,15 +105,15 @@ def _in_integers(to: IntegerC, name: str, step: CStep) -> CStep:
 
 @dataclass(frozen=True, kw_only=True)
 class FixedChain(IntegerFilter):
-    """The chain of an extended model between integers.
+    """The chain of an extended model between integer readings and integer forces.
 
-    A reading times ``entry`` is a count of ``chain``; a count times its factor of leaving, 2^``lowered`` times
-    smaller, is a force in steps.
+    A reading times ``entry`` is a count of ``chain``; a count times its leaving factor, divided by 2^``lowered``, is a
+    force in steps.
 
-    ``rounding_n`` is half a step of the force and the roundings inside, raised as the chain raises its input.
-    ``error_bound_n`` adds what rounding a reading to its step does: the sum of what moving each single reading by half
-    a step does to a force, measured along the test readings, and the drift of a hold, or what moving all readings of
-    a walk does, with a margin.
+    ``rounding_n`` is half a step of the force plus the roundings inside, amplified as the chain amplifies its input.
+    ``error_bound_n`` adds the effect of rounding the readings to their step. It is the larger of two measured figures,
+    with a margin: the sum of the effects of moving each single reading by half a step, plus the drift of a hold; or the
+    effect of moving all readings of a walk.
     """
 
     chain: IntegerChain
@@ -121,7 +122,10 @@ class FixedChain(IntegerFilter):
 
     @classmethod
     def of(cls, model: ExtendedFilterModel, fixed: str) -> FixedChain:
-        """The chain in ``fixed`` ("q15", "q31"); raises `UsageError` where its error would be no filter's."""
+        """The chain in ``fixed`` ("q15", "q31").
+
+        Raises `UsageError` where its error would be too large to be useful.
+        """
         filter_ = model.filter
         width, full_scale_n = WIDTHS[fixed], filter_.model.full_scale_load_n
         share = abs(filter_.reading_per_share)
@@ -153,7 +157,7 @@ class FixedChain(IntegerFilter):
 
 
 def _gain_n(model: ExtendedFilterModel, step: float) -> float:
-    """Largest change of a force over that of the readings up to it, ``step``, in N per reading unit: measured."""
+    """Measured largest change of a force per change ``step`` of the readings up to it, in N per reading unit."""
     filter_ = model.calibration.compensator(model.sample_rate_hz)
 
     def forces_n(readings: Array) -> Array:
@@ -173,7 +177,7 @@ def _gain_n(model: ExtendedFilterModel, step: float) -> float:
 
 
 def _single_n(forces_n: Forces, readings: Array, step: float) -> float:
-    """The sum over the lag of the most that one reading, moved by ``step``, does to a force that much later."""
+    """Largest change in N of a later force when one reading moves by ``step``, summed over the lag."""
     base_n = forces_n(readings)
     lagged_n = np.zeros(readings.size)
     for at in np.linspace(1, readings.size - 1, MOVED).astype(int):
@@ -186,7 +190,7 @@ def _single_n(forces_n: Forces, readings: Array, step: float) -> float:
 
 
 def _held_n(forces_n: Forces, reading: float, step: float, after: int) -> float:
-    """What the first reading does, which counts as having lasted for ever, and a sum over readings ``after`` that."""
+    """Effect in N of moving the first reading (taken as the steady state), plus the drift beyond ``after`` samples."""
     hold = np.full(RUN, reading)
     begun = np.concatenate([[reading + step], hold[1:]])
     held_n = forces_n(hold)
@@ -196,7 +200,10 @@ def _held_n(forces_n: Forces, reading: float, step: float, after: int) -> float:
 
 
 def _whole_n(forces_n: Forces, walk: Array, step: float, rng: np.random.Generator) -> float:
-    """What moving every reading of a walk by ``step`` does, each up or down: this finds where the chain is steep."""
+    """Largest change in N when every reading of a walk moves by ``step``, up or down.
+
+    This finds steep parts of the chain.
+    """
     base_n = forces_n(walk)
     signs = [np.ones(walk.size), -np.ones(walk.size), *rng.choice([-1.0, 1.0], (DRAWS, walk.size))]
     return max(float(np.abs(forces_n(walk + step * sign) - base_n).max()) for sign in signs)

@@ -1,4 +1,4 @@
-"""The plain filter in integer arithmetic: its scaling, and a bound on what that does to the force."""
+"""The plain filter in integer arithmetic: its scaling, and a bound on the resulting error of the force."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from smartshoe.errors import UsageError
 
 WIDTHS = {"q15": 15, "q31": 31}
 HEADROOM = {"q15": 1.25, "q31": 16.0}
-"""How far beyond the calibrated load the range goes at least: 16 bits have no step to spare, 32 bits have."""
-PRODUCT_BITS = 62  # a product and half a step of what is shifted away stay within 64 bits
+"""Least range over the calibrated load: 16 bits have no resolution to spare, 32 bits have."""
+PRODUCT_BITS = 62  # a product plus half the last bit kept stays within 64 bits
 LARGEST_SHIFT = 62
-WORST_SHARE = 0.01  # of the calibrated load: a bound beyond it is no filter
+WORST_SHARE = 0.01  # of the calibrated load: with a larger error bound the filter is refused
 USUAL_LOAD_N = 800.0
 
 
 @dataclass(frozen=True)
 class Scaled:
-    """A constant as ``mantissa`` 2^-``shift``; ``error`` is how far that is from it."""
+    """A constant approximated by ``mantissa`` 2^-``shift``; ``error`` is the absolute error of that."""
 
     mantissa: int
     shift: int
@@ -31,7 +31,10 @@ class Scaled:
 
     @classmethod
     def of(cls, value: Fraction, largest: int) -> Scaled | None:
-        """As many bits as a product with an integer of up to ``largest`` leaves room for; None where none is left."""
+        """``value`` with as many bits as a product with an integer up to ``largest`` allows.
+
+        None if no bits are left.
+        """
         bits: int = PRODUCT_BITS - largest.bit_length()
         size = abs(value)
         magnitude: int = size.numerator.bit_length() - size.denominator.bit_length() + 1 if value else 0
@@ -44,11 +47,11 @@ class Scaled:
 
 @dataclass(frozen=True, kw_only=True)
 class IntegerFilter:
-    """A filter whose readings and forces are integers of ``width`` bits and a sign.
+    """A filter whose readings and forces are signed integers of ``width`` bits.
 
     They count steps of ``input_lsb`` (reading unit) and ``output_lsb`` (N), both powers of two. ``rounding_n`` bounds
-    the force's distance in N from the exact filter of the integers; ``error_bound_n`` adds what rounding the reading
-    to its step does.
+    the force's distance in N from the exact filter of the same integers; ``error_bound_n`` adds the effect of rounding
+    the reading to its step.
     """
 
     width: int
@@ -59,16 +62,16 @@ class IntegerFilter:
 
     @property
     def integer(self) -> str:
-        """C's name of the type that goes in and out."""
+        """The C type of input and output."""
         return f"int{self.width + 1}_t"
 
     @property
     def most(self) -> int:
-        """The largest integer."""
+        """The largest integer of that type."""
         return int(2**self.width - 1)
 
     def steps(self, readings: Array) -> Integers:
-        """Readings (n,) as integers, to the nearest step, clipped at the type's ends."""
+        """Readings (n,) as integers, rounded to the nearest step, clipped to the type's range."""
         return np.clip(np.rint(readings / self.input_lsb), -self.most - 1, self.most).astype(np.int64)
 
 
@@ -76,10 +79,10 @@ class IntegerFilter:
 class FixedPoint(IntegerFilter):
     """Constants of force = direct r + state - bias, state += feed r - leak state, r the reading in steps.
 
-    State and bias count 2^-``fraction`` of the output's step; the leak is
-    taken from the state's bits above ``split`` and below it by turns. The offset of the reading is in the bias,
-    exactly, as the filter starts in balance. ``rounding_n`` bounds the force's distance
-    in N from the exact filter of the integers; ``error_bound_n`` adds what rounding the reading to its step does.
+    State and bias count 2^-``fraction`` of the output's step; the leak is computed separately from the state's bits
+    above and below ``split``. The reading's offset is part of the bias, exactly, since the filter starts in balance.
+    ``rounding_n`` bounds the force's distance in N from the exact filter of the same integers; ``error_bound_n`` adds
+    the effect of rounding the reading to its step.
     """
 
     width: int
@@ -95,13 +98,16 @@ class FixedPoint(IntegerFilter):
 
     @classmethod
     def of(cls, model: FilterModel, fixed: str) -> FixedPoint:
-        """The scaling with the smallest bound; raises `UsageError` where even that is no filter, and of other kinds."""
+        """The scaling with the smallest error bound.
+
+        Raises `UsageError` where even that is too large, and for other kinds.
+        """
         if fixed not in WIDTHS:
             raise UsageError(f"fixed point {fixed!r} is not known: use {' or '.join(WIDTHS)}")
         width = WIDTHS[fixed]
         load_n = max(map(abs, model.calibration.load_range_n or (0.0, 0.0))) or USUAL_LOAD_N
         gains = abs(model.static_gain), abs(model.numerator[0])
-        # A gain of next to nothing would ask for a range without end.
+        # A gain near zero would require an unbounded range.
         slowest = max(min(gains), 0.25 * max(gains))
         reading = abs(model.calibration.offset) + load_n / slowest
         most = 2**width - 1
@@ -139,7 +145,7 @@ class FixedPoint(IntegerFilter):
         direct, fed, leaked, start = (part for part in parts if part is not None)
         if leaked.shift < split:
             return None
-        # Half a unit at each rounding, and what the constants' own rounding makes of the largest argument.
+        # Half a unit at each rounding, and the effect of the constants' own rounding on the largest argument.
         step = fed.error * largest + leaked.error * state + 1.5
         units = direct.error * largest + 0.5 + max(start.error * largest + 0.5, step / float(settling)) + 0.5
         rounding_n = output_lsb * (units * 2.0**-fraction + 0.5)
@@ -152,20 +158,20 @@ class FixedPoint(IntegerFilter):
 
 @dataclass(frozen=True)
 class FixedVector:
-    """The test vector of a fixed-point filter: what `FilterModel` tests with, missing readings left out."""
+    """The test vector of a fixed-point filter: that of `FilterModel` without missing readings."""
 
     model: FilterModel
     fixed: IntegerFilter
 
     @cached_property
     def steps(self) -> Integers:
-        """(n,) readings in steps."""
+        """(n,) readings in input steps."""
         readings = self.model.test_readings
         return self.fixed.steps(readings[np.isfinite(readings)])
 
     @cached_property
     def forces_n(self) -> Array:
-        """(n,) forces in N that `Compensator.push` gives for `steps`, clipped where the type ends."""
+        """(n,) forces in N that `Compensator.push` gives for `steps`, clipped to the type's range."""
         filter_ = self.model.calibration.compensator(self.model.sample_rate_hz)
         forces_n = filter_.apply(self.steps * self.fixed.input_lsb)
         ends_n = np.array([-self.fixed.most - 1, self.fixed.most]) * self.fixed.output_lsb
@@ -173,7 +179,7 @@ class FixedVector:
 
 
 def too_coarse(model: FilterModel, fixed: str, found: IntegerFilter | None) -> UsageError:
-    """The refusal of a filter that ``fixed`` cannot hold, with the bound of the best that it can."""
+    """The error for a filter that ``fixed`` cannot represent, stating the best bound that it can reach."""
     says = "" if found is None else f", the error would be up to {found.error_bound_n:.3g} N"
     return UsageError(
         f"{fixed} cannot hold the filter of {model.calibration.unit or 'this unit'} at"
@@ -182,5 +188,5 @@ def too_coarse(model: FilterModel, fixed: str, found: IntegerFilter | None) -> U
 
 
 def power_of_two(value: float) -> float:
-    """The smallest power of two that is not below ``value``."""
+    """The smallest power of two that is at least ``value``."""
     return float(2.0 ** np.ceil(np.log2(value)))

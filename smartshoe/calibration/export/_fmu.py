@@ -1,4 +1,4 @@
-"""Target ``fmu``: an FMI 3.0 co-simulation unit around the exported C, without Python inside."""
+"""Target ``fmu``: an FMI 3.0 co-simulation unit around the exported C code, without Python inside."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from smartshoe.units import NEWTON, Unit
 LIBRARY = {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib"), "Windows": ("windows", ".dll")}
 MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-fPIC")
-DATED = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can say: equal units give equal files
+DATED = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip file; constant, so that equal units give equal files
 
 
 class Variable(NamedTuple):
-    """An input or output as the model description has it."""
+    """An input or output in the model description."""
 
     name: str
     unit: str
@@ -36,7 +36,7 @@ class Variable(NamedTuple):
 
 
 def fmu_files(model: FilterModel) -> dict[str, bytes]:
-    """NAME.fmu, file name to bytes: input ``reading``, output ``force`` in N, sampled at the model's rate."""
+    """NAME.fmu of the filter, file name to bytes: input ``reading``, output ``force`` in N, at the model's rate."""
     sources = c_files(model)
     reading = model.calibration.reading_unit
     return _unit(
@@ -49,7 +49,7 @@ def fmu_files(model: FilterModel) -> dict[str, bytes]:
 
 
 def twin_files(model: TwinModel) -> dict[str, bytes]:
-    """NAME.fmu of the unit itself: input ``load`` in N, output ``reading``."""
+    """NAME.fmu of the unit itself, file name to bytes: input ``load`` in N, output ``reading``."""
     reading = model.calibration.reading_unit
     return _unit(
         model,
@@ -70,7 +70,7 @@ def _unit(
 ) -> dict[str, bytes]:
     from smartshoe.version import __version__
 
-    # The token says whether binary and description belong together.
+    # The token tells whether binary and description belong together.
     token = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32]
     values: dict[str, Any] = {
         "token": token,
@@ -102,15 +102,15 @@ def _unit(
 
 
 def compiler() -> str | None:
-    """The C compiler that is used: that of the environment variable CC, or cc, gcc or clang."""
+    """The C compiler: that of the environment variable CC, else cc, gcc or clang; None where there is none."""
     wanted = os.environ.get("CC")
     return next((path for name in (wanted, "cc", "gcc", "clang") if name and (path := shutil.which(name))), None)
 
 
 def _binary(name: str, sources: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The library for this platform, path in the unit to bytes.
+    """The compiled library for this platform, path in the unit to bytes.
 
-    Raises `UsageError` without a compiler, on a platform that FMI has no name for, and where it does not compile.
+    Raises `UsageError` without a compiler, on a platform that FMI has no name for, and where the code does not compile.
     """
     found = compiler()
     system, machine = LIBRARY.get(platform.system()), MACHINES.get(platform.machine().lower())
@@ -123,7 +123,7 @@ def _binary(name: str, sources: Mapping[str, bytes]) -> dict[str, bytes]:
             (folder / file).write_bytes(content)
         out = folder / f"{name}{system[1]}"
         code = [file for file in sources if file.endswith(".c")]
-        # Run inside the folder, so that no path of this machine gets into the library.
+        # Compiled inside the folder, so that no absolute path gets into the library.
         done = subprocess.run(
             [found, *FLAGS, *code, "-o", out.name, "-lm"], cwd=folder, capture_output=True, text=True, check=False
         )
@@ -133,7 +133,7 @@ def _binary(name: str, sources: Mapping[str, bytes]) -> dict[str, bytes]:
 
 
 def _units(reading: Unit) -> list[dict[str, str]]:
-    """Names and base units of what the variables are in; only pressure and force are told in SI."""
+    """Names and base units of the variables' units; only pressure and force are related to SI."""
     base = 'kg="1" m="1" s="-2"'
     known = {"N": base, "s": 's="1"'}
     if reading.quantity == "pressure":

@@ -1,8 +1,8 @@
-"""C of the blocks of an extended model turned into integer arithmetic: every double a 64-bit count of 2^-fraction.
+"""Translates the C code of an extended model's blocks to integers: every double becomes a 64-bit count of 2^-fraction.
 
-The blocks are written in a small part of C (declarations, assignments, if, for, while, break, calls of <math.h>). It is
-parsed and written anew: sums stay sums, products and quotients become calls of `INTEGER_FUNCTIONS`. Each expression
-carries a bound on its size, so that no sum leaves 64 bits: what could is first held at `MOST`.
+The blocks are written in a small subset of C (declarations, assignments, if, for, while, break, calls of <math.h>). It
+is parsed and rewritten: sums stay sums, products and quotients become calls of `INTEGER_FUNCTIONS`. Each expression
+carries a bound on its size, so that no sum exceeds 64 bits: one that could is first limited to `MOST`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fractions import Fraction
 from smartshoe.calibration.export._integer_functions import MOST, REAL_FUNCTIONS
 from smartshoe.models.effects.effect import CStep
 
-_ROOM = 2**62  # a sum below it stays in 64 bits with half a step of rounding
+_ROOM = 2**62  # a smaller sum stays within 64 bits after half a step of rounding
 _TOKEN = re.compile(
     r"(?:\s|/\*.*?\*/)*(?:(?P<real>(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+)|(?P<whole>\d+)|(?P<name>[A-Za-z_]\w*)"
     r"|(?P<sign>->|\+\+|\+=|-=|\*=|/=|<=|>=|==|!=|&&|\|\||[-+*/<>=!?:;,(){}\[\]]))"
@@ -27,7 +27,7 @@ _LEVELS = (("||",), ("&&",), ("==", "!=", "<", ">", "<=", ">="), ("+", "-"), ("*
 class _Term:
     """C text of an expression: ``real`` where it counts 2^-fraction, ``size`` its largest magnitude in counts.
 
-    ``value`` is that of a constant, as it was before scaling. ``tight`` text needs no brackets.
+    ``value`` is that of a constant before scaling, else None. ``tight`` text needs no brackets.
     """
 
     text: str
@@ -43,37 +43,37 @@ class _Term:
 
 @dataclass
 class IntegerC:
-    """Turns steps into integers; ``used`` gathers the functions that the texts call."""
+    """Translates steps to integers; ``used`` collects the functions that the texts call."""
 
     fraction: int
     used: set[str] = field(default_factory=set)
 
     @property
     def one(self) -> int:
-        """The count of 1."""
+        """The number of counts that represents 1."""
         return int(2**self.fraction)
 
     def step(self, step: CStep) -> CStep:
-        """``step`` with counts in place of doubles; ``states`` are counts too."""
+        """``step`` with counts in place of doubles, states included."""
         body = _Parser(step.body, self).everything()
         return CStep({name: self.count(Fraction(value)) for name, value in step.states.items()}, body)
 
     def count(self, value: Fraction) -> int:
-        """``value`` in counts to the nearest, held at `MOST`."""
+        """``value`` rounded to counts, limited to `MOST`."""
         return max(-MOST, min(MOST, round(value * self.one)))
 
     def literal(self, value: Fraction) -> _Term:
-        """A constant."""
+        """The term of a constant."""
         count = self.count(value)
         return _Term(f"INT64_C({count})" if count >= 0 else f"(-INT64_C({-count}))", True, abs(count), value)
 
     def call(self, function: str, *arguments: str) -> str:
-        """A call of an integer function, which is then among those that are written."""
+        """The text of a call of an integer function, which is added to ``used``."""
         self.used.add(function)
         return f"{function}({', '.join(arguments)})"
 
     def held(self, term: _Term, within: int = MOST) -> _Term:
-        """``term`` no larger than ``within``."""
+        """``term`` limited to magnitudes up to ``within``."""
         if term.size <= within:
             return term
         return _Term(self.call("held_q", term.text), True, MOST)
@@ -191,7 +191,7 @@ class _Parser:
         return "{" + ", ".join(values) + "}"
 
     def _given(self, term: _Term, real: bool) -> str:
-        """What may be stored: a variable never exceeds `MOST`."""
+        """The text of a value to be stored, limited so that a variable never exceeds `MOST`."""
         return self.to.held(self._real(term)).text if real else term.text
 
     def _assignment(self) -> str:
@@ -246,7 +246,7 @@ class _Parser:
             return term
         if term.value is not None:
             return self.to.literal(term.value)
-        # Of an index into a table: far below what the counts hold.
+        # An index into a table is far below the limit of the counts.
         return _Term(f"(int64_t){term.closed} * INT64_C({self.to.one})", True, MOST, None, tight=False)
 
     def _sum(self, sign: str, left: _Term, right: _Term) -> _Term:

@@ -1,4 +1,4 @@
-"""C99 of the arithmetic that exported integers run on: products, quotients, roots, powers of 64-bit counts."""
+"""C99 code of the integer arithmetic of exported filters: products, quotients, roots, powers of 64-bit counts."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Sequence, Set
 from fractions import Fraction
 
 MOST = 2**59
-"""No count is larger: four of them still add up within 64 bits."""
+"""Largest count, so that a sum of four stays within 64 bits."""
 REAL_FUNCTIONS = ("exp", "expm1", "log", "log1p", "pow", "sqrt", "tanh", "fabs", "fmax", "fmin")
-"""Functions of <math.h> that have an integer twin; all are called NAME_q, which no block calls its own."""
+"""Functions of <math.h> that have an integer twin, called NAME_q, a name that no block uses itself."""
 
 _LOGARITHM_TERMS = 9  # of an odd series in at most 0.2: the next is 0.2^19/19 = 3e-15
 _EXPONENTIAL_TERMS = 14  # of a series in at most 0.35: the next is 0.35^15/15! = 1e-19
 
 
 def functions_text(used: Set[str], fraction: int) -> str:
-    """The functions ``used`` and those that they call, in an order in which each is known before it is called."""
+    """The functions ``used`` and those they call, ordered so that each is defined before it is called."""
     texts = _texts(fraction)
     needed: set[str] = set()
     open_ = list(used)

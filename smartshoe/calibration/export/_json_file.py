@@ -1,4 +1,4 @@
-"""Target ``json``: every form of the filter as numbers, for tools of any language."""
+"""Target ``json``: every form of the filter as numbers, for tools in any language."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SCHEMA = "smartshoe.export/1"
 
 
 def json_files(model: FilterModel) -> dict[str, str]:
-    """NAME.json, file name to text; full precision, a missing reading of the test vector is null."""
+    """NAME.json, file name to text; numbers in full precision, a missing reading of the test vector as null."""
     calibration = model.calibration
     found: dict[str, Any] = {
         "schema": SCHEMA,
@@ -53,7 +53,7 @@ def json_files(model: FilterModel) -> dict[str, str]:
 
 
 def _extended(model: ExtendedFilterModel) -> dict[str, Any]:
-    """The whole model, and its linear network's inverse at the sample rate."""
+    """The JSON object of the whole extended model, with the inverse of its linear network at the sample rate."""
     filter_ = model.filter
     core = filter_.core
     return {

@@ -13,8 +13,8 @@ from smartshoe.errors import UsageError
 def matlab_files(model: FilterModel) -> dict[str, str]:
     """NAME.m, NAME_test.m and the test vector, file name to text; double precision.
 
-    Of an extended model, the linear network (relaxation, heat, linear leak) and constant shifts of load and reading
-    are written; raises `UsageError` naming the other effects.
+    Of an extended model, only the linear network (relaxation, heat, linear leak) and constant shifts of load and
+    reading can be exported; raises `UsageError` naming the other effects.
     """
     shared: dict[str, object] = {
         "readings": [finite_or(value, "NaN", "Inf", repr(value)) for value in model.test_readings.tolist()],

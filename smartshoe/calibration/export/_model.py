@@ -1,4 +1,4 @@
-"""What every target writes: the discrete filter in its forms, a test vector, and where it all comes from."""
+"""What every target exports: the discrete filter in its forms, a test vector, and its provenance."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ FLOAT_ROUNDING = 2.0**-24
 
 @dataclass(frozen=True)
 class FilterModel:
-    """A first-order filter ready to be written; ``kind`` names its templates, ``name`` its files and symbols.
+    """A first-order filter ready for export; ``kind`` names its templates, ``name`` its files and symbols.
 
-    ``numerator`` and ``denominator`` (2,) each in falling powers of z, the very numbers that `Compensator` runs;
-    ``provenance`` is what a header comment says, key to text.
+    ``numerator`` and ``denominator``, (2,) each in falling powers of z, are the very numbers that `Compensator` runs;
+    ``provenance`` goes into a header comment, key to text.
     """
 
     calibration: Calibration
@@ -40,7 +40,7 @@ class FilterModel:
         rate_hz = calibration.sample_rate_hz if sample_rate_hz is None else sample_rate_hz
         with np.errstate(over="ignore", invalid="ignore"):
             numerator, denominator = discretise(calibration.a1, calibration.b0, calibration.b1, rate_hz, "bilinear")
-        # 1 - |den1| is what is left of the pole: below this, rounding of den1 alone moves the static gain by 1e-4.
+        # 1 - |den1| is the pole's distance from 1: below this, rounding of den1 alone changes the static gain by 1e-4.
         if not (np.isfinite(numerator).all() and 1.0 - abs(denominator[1]) > 1e-12):
             raise UsageError(
                 f"sample_rate_hz is {rate_hz:g}, too far from the pole of {calibration.a1:g} 1/s for double precision:"
@@ -52,12 +52,12 @@ class FilterModel:
 
     @property
     def static_gain(self) -> float:
-        """Force over reading at rest, N per reading unit, of the discrete filter."""
+        """Force over reading in steady state, in N per reading unit, of the discrete filter."""
         return float(np.sum(self.numerator) / np.sum(self.denominator))
 
     @property
     def leak(self) -> float:
-        """1 + den1, the share of its state that the filter loses at each sample."""
+        """1 + den1, the share of its state that the filter loses per sample."""
         return float(1 + Fraction(self.denominator[1]))
 
     @property
@@ -68,14 +68,14 @@ class FilterModel:
 
     @property
     def state_gain(self) -> float:
-        """Static gain less the direct term: the steady state that belongs to a reading."""
+        """Static gain minus the direct term: the steady state per unit of reading."""
         return self.static_gain - self.numerator[0]
 
     @cached_property
     def test_readings(self) -> Array:
         """(n,) readings in the reading unit: missing, rest, ramps, a hold, a step, both kinds of missing again.
 
-        Rounded to single precision, so that a float build is given the same numbers.
+        Rounded to single precision, so that a float build gets the same numbers.
         """
         load_n = (self.calibration.load_range_n or (0.0, 800.0))[1] or 800.0
         span = load_n / self.static_gain if abs(self.static_gain) > 1e-6 * abs(self.numerator[0]) else load_n
@@ -94,11 +94,11 @@ class FilterModel:
         return np.array([filter_.push(float(value)) for value in self.test_readings])
 
     def tolerance_n(self, precision: str) -> float:
-        """Bound in N on what rounding may do to `test_forces_n` in ``precision``.
+        """Bound in N on the effect of rounding on `test_forces_n` in ``precision``.
 
-        Rounding of each step, of the terms that it adds up, gathers in the state for min(n, 1/(1 - |den1|)) samples.
-        In double the terms are den1*force and n1*u. In float they are feed*u and leak*state, smaller by the leak;
-        the sum itself loses nothing, as its rounding is carried over.
+        Rounding errors of each step and of its terms accumulate in the state for min(n, 1/(1 - |den1|)) samples. In
+        double the terms are den1*force and n1*u. In float they are feed*u and leak*state, smaller by the leak; the sum
+        itself loses nothing, as its rounding error is carried over.
         """
         finite = self.test_readings[np.isfinite(self.test_readings)]
         u = float(np.abs(finite - self.calibration.offset).max(initial=0.0))
@@ -114,7 +114,7 @@ class FilterModel:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What a reader of the file must know of its origin, key to one line of text."""
+        """The origin of the filter, for the reader of the file: key to one line of text."""
         calibration = self.calibration
         found = origin(calibration, self.sample_rate_hz)
         found["reading"] = one_safe_line(
@@ -129,13 +129,13 @@ class FilterModel:
 
 @dataclass(frozen=True)
 class ExtendedFilterModel(FilterModel):
-    """The inverse of an extended model's chain; numerator and denominator are its linear part's."""
+    """The inverse of an extended model's chain; numerator and denominator are those of its linear part."""
 
     kind: str = "extended"
 
     @cached_property
     def filter(self) -> ExtendedCompensator:
-        """The filter that is written, without a past."""
+        """The exported filter, in its initial state."""
         found = self.calibration.compensator(self.sample_rate_hz)
         if not isinstance(found, ExtendedCompensator):
             raise UsageError(f"calibration of {self.calibration.unit or 'a unit'} holds no extended model")
@@ -143,17 +143,17 @@ class ExtendedFilterModel(FilterModel):
 
     @property
     def is_steep(self) -> bool:
-        """Whether single precision between two blocks would move the force too far."""
+        """Whether single precision between two blocks would change the force too much."""
         undone = {name for name, _ in self.filter.blocks}
         return any(part.effect.is_steep_undone for part in self.filter.model.parts if part.name in undone)
 
     def tolerance_n(self, precision: str) -> float:
-        """Bound in N on what rounding may do to `test_forces_n`.
+        """Bound in N on the effect of rounding on `test_forces_n`.
 
-        Each block is run in the order of operations of the filter. In double, what is left comes from the library's
-        exp and pow and is some 1e-14 of full scale; the bound is a billionth, and a wrong constant shows in the
-        fourth digit. In float it is two dozen roundings a block, of the largest force; six in all where the chain is
-        steep, and therefore run in integers.
+        Each block runs in the filter's order of operations. In double, differences come only from the library's exp and
+        pow, some 1e-14 of full scale; the bound is a billionth, and a wrong constant shows in the fourth digit. In
+        float it is two dozen roundings per block, of the largest force; six in all where the chain is steep, and
+        therefore run in integers.
         """
         most_n = max(np.abs(self.test_forces_n).max(), self.filter.model.full_scale_load_n)
         if precision == "float" and self.is_steep:
@@ -162,7 +162,7 @@ class ExtendedFilterModel(FilterModel):
 
     @property
     def provenance(self) -> dict[str, str]:
-        """As the plain filter's, with the effects."""
+        """As for the plain filter, with the effects added."""
         filter_ = self.filter
         found = super().provenance
         found["reading"] = one_safe_line(self.calibration.reading_unit.symbol)
@@ -181,14 +181,14 @@ class ExtendedFilterModel(FilterModel):
 
 
 def one_safe_line(text: str) -> str:
-    """``text`` as one line that cannot end or nest a C comment, nor continue a line."""
+    """``text`` as one line that can neither end nor nest a C comment, nor continue a line."""
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-    # A slash or star after the other, and ??/ (a trigraph for the backslash), mean something in a C comment.
+    # Slash and star next to each other, and ??/ (a trigraph for the backslash), have a meaning in a C comment.
     return line.replace("/*", "/ *").replace("*/", "* /").replace("\\", "/").replace("??", "? ?").replace("/*", "/ *")
 
 
 def origin(calibration: Calibration, sample_rate_hz: float) -> dict[str, str]:
-    """Where a calibration comes from and what it holds for, key to one line of text; "model" is for the caller."""
+    """Where a calibration comes from and its range of validity, key to one line of text; the caller sets "model"."""
     from smartshoe.version import __version__
 
     low_high = calibration.load_range_n

@@ -1,4 +1,4 @@
-"""What an exported filter is called: names that are C, MATLAB and file names at once."""
+"""Names of exported filters, valid for C, MATLAB and files at once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from smartshoe.errors import UsageError
 
 DEFAULT_NAME = "smartshoe_filter"
 TWIN_NAME = "smartshoe_twin"
-LONGEST = 63  # what C99 and MATLAB both tell apart
+LONGEST = 63  # significant characters in both C99 and MATLAB
 
 # C99 6.4.1 and C++ keywords that C lacks, MATLAB's keywords, and names that the C code itself uses.
 _KEYWORDS = """
@@ -20,7 +20,7 @@ _KEYWORDS = """
     template this throw true try typename using virtual elseif end function global otherwise parfor persistent spmd
     main isfinite
 """
-# Files of these names would stand in front of the standard library's headers.
+# Files of these names would hide the standard library's headers.
 _HEADERS = """
     assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef
     stdint stdio stdlib string tgmath time wchar wctype
@@ -31,10 +31,10 @@ _TAKEN = frozenset(f"{_KEYWORDS} {_HEADERS}".split())
 def names_of(
     calibrations: Sequence[Calibration], given: Sequence[str] = (), default: str = DEFAULT_NAME
 ) -> tuple[str, ...]:
-    """One name a calibration, ``given`` by the user or made of the units' names.
+    """One name per calibration, ``given`` by the user or made from the units' names.
 
-    One calibration: the name given, else ``default``. Several: a name each, or one that goes before the unit's
-    name, or the units' names. Raises `UsageError` for a name that C or MATLAB cannot use, and where two are alike.
+    One calibration: the given name, else ``default``. Several: one name each, or one prefix for the units' names, or
+    the units' names alone. Raises `UsageError` for a name that C or MATLAB cannot use, and for two equal ones.
     """
     count = len(calibrations)
     if len(given) not in (0, 1, count):
@@ -53,7 +53,7 @@ def names_of(
 
 
 def _from_unit(unit: str, number: int) -> str:
-    """The unit's name with all that no identifier may hold turned into underscores."""
+    """The unit's name with all characters that an identifier may not contain replaced by underscores."""
     made = re.sub(r"[^A-Za-z0-9]+", "_", unit).strip("_")
     if not made:
         raise UsageError(f"calibration {number} has no unit name to call its files by: give --name once for each")
@@ -72,7 +72,7 @@ def _check(name: str) -> None:
 def _check_apart(names: Sequence[str]) -> None:
     seen: set[str] = set()
     for name in names:
-        # Some file systems do not tell capitals apart.
+        # Some file systems ignore case.
         if name.lower() in seen:
             raise UsageError(f"two calibrations are both called {name!r}: give --name once for each, all different")
         seen.add(name.lower())

@@ -1,4 +1,4 @@
-"""Templates of the targets, and the test vector's CSV that they share."""
+"""Renders the targets' templates, and the CSV of the test vector that they share."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from smartshoe.calibration.export._model import FilterModel
 
 
 class NamedModel(Protocol):
-    """What every template says of its model."""
+    """What every template needs of its model."""
 
     @property
     def name(self) -> str:
-        """Of files and symbols."""
+        """The name of files and symbols."""
 
     @property
     def provenance(self) -> dict[str, str]:
-        """Key to one line of text."""
+        """The model's origin, key to one line of text."""
 
 
 def render(template: str, model: NamedModel, **values: Any) -> str:
-    """The text of ``templates/template`` for ``model``; a value that it lacks is an error."""
+    """The text of ``templates/template`` for ``model``; a missing template value is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -47,7 +47,7 @@ def vector_csv(model: FilterModel) -> str:
 
 
 def columns_csv(model: FilterModel, columns: Mapping[str, NDArray[Any]]) -> str:
-    """CSV of ``columns`` (n,) each, with the provenance as comments, numbers in full precision."""
+    """CSV of ``columns``, (n,) each: the provenance as comments, then numbers in full precision."""
     lines = [f"# {key}: {text}" for key, text in model.provenance.items()]
     lines.append(",".join(columns))
     lines += [",".join(map(repr, row)) for row in zip(*(values.tolist() for values in columns.values()), strict=True)]
@@ -55,7 +55,7 @@ def columns_csv(model: FilterModel, columns: Mapping[str, NDArray[Any]]) -> str:
 
 
 def finite_or(value: float, missing: str, infinite: str, written: str) -> str:
-    """``written`` for a finite ``value``, else the language's words for NaN and signed infinity."""
+    """``written`` for a finite ``value``, else the target language's text for NaN or signed infinity."""
     if np.isnan(value):
         return missing
     if np.isinf(value):

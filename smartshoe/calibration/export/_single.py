@@ -1,4 +1,4 @@
-"""C of the blocks of an extended model turned into single precision."""
+"""Translates the C code of an extended model's blocks to single precision."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _CARRY = "_carry"
 
 
 def in_single(step: CStep) -> CStep:
-    """``step`` with every double a float, every constant rounded once, and running sums carried.
+    """``step`` with every double as float, every constant rounded once, and compensated running sums.
 
-    A sum over a session grows while its increments do not: what each addition rounds away is given back with the
-    next (Kahan 1965), so that ``f->member += ...;`` gets a member beside it.
+    A sum over a session grows while its increments do not. Therefore the rounding error of each addition is added back
+    at the next (Kahan 1965): each ``f->member += ...;`` gets a second member for it.
     """
     summed = [name for name in dict.fromkeys(match[1] for match in _SUM.finditer(step.body)) if name in step.states]
     body = _SUM.sub(lambda match: _carried(match[1], match[2]) if match[1] in summed else match[0], step.body)
@@ -27,7 +27,7 @@ def in_single(step: CStep) -> CStep:
 
 
 def single_text(text: str) -> str:
-    """C text with float in place of double: types, constants, functions of the library."""
+    """C text with float in place of double: types, constants, library functions."""
     text = re.sub(r"\bdouble\b", "float", text)
     text = _FUNCTION.sub(r"\1f(", text)
     return _NUMBER.sub(lambda match: f"{np.float32(match[0])!s}f", text)

@@ -1,4 +1,4 @@
-"""The unit itself, load in and reading out, as C: what stands in a simulation where the shoe would."""
+"""The unit itself, load in and reading out, as C code: it takes the shoe's place in a simulation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from smartshoe.models.extended import ExtendedModel, Part
 
 
 def shifts_of(model: ExtendedModel) -> dict[str, float]:
-    """What effects add to load and reading whatever the time, shares of full scale: load_shift and reading_shift."""
+    """Constant shifts of load and reading by effects, as shares of full scale: load_shift and reading_shift."""
     found = {"load_shift": 0.0, "reading_shift": 0.0}
     for part in model.parts:
         if part.effect.shifts is not None:
@@ -24,7 +24,7 @@ def shifts_of(model: ExtendedModel) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class TwinModel:
-    """`Calibration.model` forward at ``sample_rate_hz``: the linear network of wall and gas, and constant shifts."""
+    """`Calibration.model` run forward at ``sample_rate_hz``: the linear network of wall and gas, constant shifts."""
 
     calibration: Calibration
     sample_rate_hz: float
@@ -32,7 +32,7 @@ class TwinModel:
 
     @cached_property
     def model(self) -> ExtendedModel:
-        """What is simulated; raises `UsageError` naming effects that are not written forward."""
+        """The simulated model; raises `UsageError` naming effects that cannot be exported forward."""
         found = self.calibration.model()
         others = [p.name for p in found.chain if p is not None and p.effect.shifts is None and not _is_idle(p)]
         if others:
@@ -44,7 +44,7 @@ class TwinModel:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What a reader of the file must know of its origin, key to one line of text."""
+        """The origin of the model, for the reader of the file: key to one line of text."""
         found = self.model
         said = origin(self.calibration, self.sample_rate_hz)
         said["model"] = one_safe_line(

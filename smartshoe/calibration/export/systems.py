@@ -17,9 +17,8 @@ def scipy_system(
 ) -> TransferFunction:
     """Force in N over the reading less its offset, as a `scipy.signal` transfer function.
 
-    Discrete at ``sample_rate_hz`` (the calibration's own where none is given), with the very numbers that the
-    compensator runs; ``continuous`` gives (b0 s + b1)/(s + a1), Chinimilli 2016 (13). Of an extended calibration it
-    is the linear part.
+    Discrete at ``sample_rate_hz`` (by default the calibration's own), with the very numbers that the compensator runs;
+    ``continuous`` gives (b0 s + b1)/(s + a1), Chinimilli 2016 (13). Of an extended calibration it is the linear part.
     """
     from scipy import signal
 
@@ -47,7 +46,7 @@ def control_system(calibration: Calibration, *, sample_rate_hz: float | None = N
 def _coefficients(
     calibration: Calibration, sample_rate_hz: float | None, continuous: bool
 ) -> tuple[list[float], list[float], float | None]:
-    """Numerator and denominator, highest power first, and the step in s (None: continuous)."""
+    """Numerator and denominator, highest power first, and the time step in s (None: continuous)."""
     if continuous:
         if sample_rate_hz is not None:
             raise UsageError("a continuous system has no sample_rate_hz: leave one of the two away")

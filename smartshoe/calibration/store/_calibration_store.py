@@ -1,4 +1,4 @@
-"""`CalibrationStore`: every calibration of every unit, and what happened to the units between them."""
+"""`CalibrationStore`: all calibrations of all units, and the events in the units' lives."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ def default_folder() -> Path:
 
 
 def is_store(folder: Path | str) -> bool:
-    """Whether a folder is a store, and no folder of calibration files: its units have folders of their own."""
+    """Whether a folder is a store, where each unit has its own folder, rather than a folder of calibration files."""
     return (Path(folder) / files.UNITS).is_dir()
 
 
 class CalibrationStore:
-    """Calibrations in a folder of plain files that are read anew at each question.
+    """Calibrations in a folder of plain files, which are read again at each query.
 
-    Dates are ISO texts, dates or datetimes (UTC where they do not say). Nothing is overwritten or removed. Several
-    processes may add and read at once. ``faults`` says of each file that could not be used why.
+    Dates are ISO strings, dates or datetimes (UTC unless stated). Nothing is overwritten or removed. Several processes
+    may add and read at once. ``faults`` says for each unusable file why.
     """
 
     def __init__(self, folder: Path | str | None = None) -> None:
@@ -54,7 +54,7 @@ class CalibrationStore:
     def __str__(self) -> str:
         return str(self.folder)
 
-    # -- what goes in ------------------------------------------------------------------------------------------
+    # -- adding ------------------------------------------------------------------------------------------------
     def add(
         self,
         calibration: Calibration,
@@ -65,11 +65,11 @@ class CalibrationStore:
         valid_for_days: float | None = None,
         note: str = "",
     ) -> Entry:
-        """Store ``calibration`` and return its entry; the same one added twice stays one.
+        """Store ``calibration`` and return its entry; adding the same one twice stores it once.
 
-        What is not given is the calibration's own: ``serial_number``, ``created``, ``unit``. Raises `UsageError`
-        where there is no serial number or date, where they contradict, or where the calibration is there already with
-        another validity or note.
+        Arguments that are not given default to the calibration's own ``serial_number``, ``created`` and ``unit``.
+        Raises `UsageError` where serial number or date is missing, where they contradict, or where the calibration is
+        already stored with another validity or note.
         """
         serial = calibration.serial_number or (serial_number or "")
         if serial_number and serial != serial_number:
@@ -111,7 +111,7 @@ class CalibrationStore:
         })  # fmt: skip
 
     def place(self, serial_number: str, position: str, date: When, note: str = "") -> HistoryEvent:
-        """From ``date`` on the unit sits at ``position`` ("left_toe"); whichever sat there has left."""
+        """Record that from ``date`` on the unit sits at ``position`` ("left_toe"), in place of any other unit."""
         if not position.strip():
             raise UsageError("no position is given: name where the unit sits, for example left_toe")
         if not position.isprintable():
@@ -119,11 +119,11 @@ class CalibrationStore:
         return self._happened("placed", serial_number, date, position, note)
 
     def repair(self, serial_number: str, date: When, note: str = "") -> HistoryEvent:
-        """The unit was repaired: calibrations from before do not hold after, nor the other way."""
+        """Record a repair of the unit: calibrations from before are not valid after it, nor the other way round."""
         return self._happened("repaired", serial_number, date, "", note)
 
     def retire(self, serial_number: str, date: When, note: str = "") -> HistoryEvent:
-        """The unit is out of use from ``date`` on."""
+        """Record that the unit is out of use from ``date`` on."""
         return self._happened("retired", serial_number, date, "", note)
 
     def _happened(self, kind: EventKind, serial_number: str, at: When, position: str, note: str) -> HistoryEvent:
@@ -136,9 +136,9 @@ class CalibrationStore:
         files.write_event(self.folder, numbered)
         return numbered
 
-    # -- what is in it -----------------------------------------------------------------------------------------
+    # -- contents ----------------------------------------------------------------------------------------------
     def _read(self) -> tuple[list[Entry], list[HistoryEvent]]:
-        """Every entry and event; files that the index does not know, or knows otherwise, are read and indexed."""
+        """Every entry and event; files that the index lacks, or that differ from it, are read and indexed."""
         now = files.listing(self.folder)
         known = files.read_index(self.folder)
         items: dict[str, Any] = {}
@@ -173,14 +173,14 @@ class CalibrationStore:
 
     @property
     def serial_numbers(self) -> tuple[str, ...]:
-        """Every unit of which there is a calibration or an event."""
+        """The serial numbers of all units with a calibration or an event."""
         entries, events = self._read()
         return tuple(sorted({e.serial_number for e in entries} | {e.serial_number for e in events}))
 
     def to_dict(self, date: When, unit: str | None = None) -> dict[str, Any]:
-        """What ``smartshoe calibrations list --json`` writes, schema smartshoe.calibrations/1.
+        """The object that ``smartshoe calibrations list --json`` writes, schema smartshoe.calibrations/1.
 
-        Places and expiry are those of ``date``; ``unit``, a serial number or a place, leaves out the others.
+        Places and expiry are those at ``date``; ``unit``, a serial number or a place, restricts the list to it.
         """
         at = moment(date, "--date")
         entries, events = self._read()
@@ -208,30 +208,30 @@ class CalibrationStore:
         }
 
     def history(self, serial_number: str) -> tuple[Entry, ...]:
-        """The calibrations of a unit by date, () where there is none; two of one date as they were added."""
+        """The calibrations of a unit by date, () where there is none; two of one date in the order they were added."""
         return tuple(entry for entry in self._read()[0] if entry.serial_number == serial_number)
 
     def entry(self, name: str) -> Entry:
-        """The calibration whose ``name`` begins so; raises `UsageError` where none or more than one does."""
+        """The calibration whose name begins with ``name``; raises `UsageError` where none or more than one does."""
         found = [entry for entry in self._read()[0] if entry.name.startswith(name) or _hash(entry).startswith(name)]
         if len(found) != 1:
             many = f"names {len(found)} calibrations" if found else "is no calibration"
             raise UsageError(f"{name!r} {many} in {self}: take a name from smartshoe calibrations list")
         return found[0]
 
-    # -- questions ---------------------------------------------------------------------------------------------
+    # -- queries -----------------------------------------------------------------------------------------------
     def latest(self, serial_number: str) -> Entry:
-        """The unit's last calibration, whatever happened since; raises `UsageError` where there is none."""
+        """The unit's last calibration, regardless of later events; raises `UsageError` where there is none."""
         history = self.history(serial_number)
         if not history:
             raise UsageError(self._unknown(serial_number))
         return history[-1]
 
     def nearest(self, serial_number: str, date: When, *, refuse_expired: bool = False) -> Found:
-        """The calibration nearest in time to ``date`` with no repair between them; of two as near, the earlier.
+        """The calibration nearest in time to ``date`` with no repair in between; the earlier one of two equally near.
 
-        Raises `UsageError` where the unit is not known, `RefusedError` where it was retired by then or no
-        calibration lies between the same repairs, and where what is found has expired and ``refuse_expired``.
+        Raises `UsageError` where the unit is not known, `RefusedError` where it was retired by then or no calibration
+        lies between the same repairs, and, with ``refuse_expired``, where the one found has expired.
         """
         at = moment(date)
         entries, all_events = self._read()
@@ -248,7 +248,7 @@ class CalibrationStore:
             bounds = (("since", since), ("before", until))
             said = " and ".join(f"{word} its repair on {iso(when)}" for word, when in bounds if when is not None)
             raise RefusedError(f"unit {serial_number} has no calibration {said}: calibrate it")
-        # Of two calibrations of one moment the one added last counts.
+        # Of two calibrations with the same date, the one added last counts.
         best = min(fitting, key=lambda e: (abs(days_between(e.date, at)), e.date, -e.order))
         found = Found(best, at, _says(best, at))
         if refuse_expired and found.is_expired:
@@ -256,7 +256,7 @@ class CalibrationStore:
         return found
 
     def position_of(self, serial_number: str, date: When) -> str:
-        """Where the unit sits at ``date``, '' where that is not known (or another unit took its place)."""
+        """The place of a unit at ``date``, '' where that is not known or another unit has taken the place."""
         at = moment(date)
         entries, events = self._read()
         placed = [e for e in events if e.kind == "placed" and e.date <= at]
@@ -272,8 +272,8 @@ class CalibrationStore:
     def unit_at(self, position: str, date: When) -> str:
         """The serial number of the unit that sits at ``position`` at ``date``.
 
-        A swap that was entered decides; before the first one, the only unit whose calibrations name the position.
-        Raises `UsageError` where there is none, `RefusedError` where several come into question.
+        Recorded placements decide; before the first one, the only unit whose calibrations name the position. Raises
+        `UsageError` where there is none, `RefusedError` where several are possible.
         """
         at = moment(date)
         entries, events = self._read()
@@ -318,7 +318,7 @@ def _back_in_use(retired: HistoryEvent, events: list[HistoryEvent], at: datetime
 
 
 def segment(events: Sequence[HistoryEvent], at: datetime) -> tuple[datetime | None, datetime | None]:
-    """The repairs before (or at) and after ``at`` among a unit's ``events``, None where there is none."""
+    """The last repair up to ``at`` and the first one after it among a unit's ``events``; None where there is none."""
     repairs = sorted(event.date for event in events if event.kind == "repaired")
     return (
         max((repair for repair in repairs if repair <= at), default=None),
@@ -337,9 +337,9 @@ def _says(entry: Entry, at: datetime) -> str:
 
 
 def find(store: CalibrationStore, unit: str, date: When, *, refuse_expired: bool = False) -> Found:
-    """The calibration to use at ``date`` for ``unit``, a serial number or else a position ("left_toe").
+    """The calibration to use at ``date`` for ``unit``, which is a serial number or else a position ("left_toe").
 
-    Raises as `CalibrationStore.nearest` and `CalibrationStore.unit_at` do.
+    Raises the errors of `CalibrationStore.nearest` and `CalibrationStore.unit_at`.
     """
     serial = unit if unit in store.serial_numbers else store.unit_at(unit, date)
     return store.nearest(serial, date, refuse_expired=refuse_expired)

@@ -1,4 +1,4 @@
-"""What the store keeps: calibrations of units, and what happened to the units."""
+"""What the store holds: calibrations of units, and events in the life of the units."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ EVENT_KINDS: tuple[EventKind, ...] = ("placed", "repaired", "retired")
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A stored calibration: of which unit, from when, where the unit sat, how long it holds.
+    """A stored calibration: its unit, its date, the unit's place, and how long it is valid.
 
-    ``name`` is the file's, without its ending; ``order`` counts the calibrations of a unit as they were added, and
-    decides between two of one date. ``valid_for_days`` is None where no expiry was said.
+    ``name`` is that of the file, without its suffix; ``order`` counts the calibrations of a unit as they were added,
+    and decides between two of the same date. ``valid_for_days`` is None where no expiry was given.
     """
 
     name: str
@@ -37,21 +37,21 @@ class Entry:
 
     @property
     def expires(self) -> datetime | None:
-        """The last moment at which it holds."""
+        """The last moment at which the calibration is valid; None without an expiry."""
         return None if self.valid_for_days is None else self.date + timedelta(days=self.valid_for_days)
 
     def is_expired(self, at: datetime) -> bool:
-        """Whether ``at`` lies further from its date, before or after, than it is valid for."""
+        """Whether ``at`` lies further from the calibration's date, before or after, than its validity."""
         return self.valid_for_days is not None and abs(days_between(self.date, at)) > self.valid_for_days
 
     def calibration(self) -> Calibration:
-        """The calibration itself, from its file; raises `InputError` where that is damaged."""
+        """The calibration itself, read from its file; raises `InputError` where that is damaged."""
         from smartshoe.calibration import Calibration
 
         return Calibration.load(self.path)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the calibration, for JSON."""
+        """The entry without the calibration itself, for JSON."""
         expires = self.expires
         return {
             "name": self.name,
@@ -69,7 +69,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class HistoryEvent:
-    """What happened to a unit: it was placed at a ``position`` (and whoever sat there left), repaired or retired."""
+    """An event in a unit's life: placed at a ``position`` (replacing any other unit there), repaired or retired."""
 
     kind: EventKind
     serial_number: str
@@ -91,18 +91,18 @@ class HistoryEvent:
 
     @property
     def happened(self) -> str:
-        """What, without the date: "placed at left_toe"."""
+        """The event without its date, such as "placed at left_toe"."""
         return f"{self.kind} at {self.position}" if self.kind == "placed" else self.kind
 
     @property
     def says(self) -> str:
-        """One clause."""
+        """The event as one clause."""
         return f"{self.happened} on {iso(self.date)}" + (f" ({self.note})" if self.note else "")
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A calibration that was looked up for ``date``: the entry, and what is to be said of its age."""
+    """The result of a search for ``date``: the entry, and remarks about its age."""
 
     entry: Entry
     date: datetime
@@ -110,12 +110,12 @@ class Found:
 
     @property
     def is_expired(self) -> bool:
-        """Whether it does not hold at that date any more (or not yet)."""
+        """Whether the calibration is not valid at that date, any more or yet."""
         return self.entry.is_expired(self.date)
 
     @property
     def age_days(self) -> float:
-        """Days since the calibration, negative where the date is before it."""
+        """Days from the calibration to the date, negative where the date is earlier."""
         return days_between(self.entry.date, self.date)
 
     def calibration(self) -> Calibration:
@@ -123,6 +123,6 @@ class Found:
         return self.entry.calibration()
 
     def to_dict(self) -> dict[str, Any]:
-        """The find for JSON."""
+        """The result for JSON."""
         found: Mapping[str, Any] = self.entry.to_dict()
         return {**found, "age_days": self.age_days, "is_expired": self.is_expired, "says": self.says}

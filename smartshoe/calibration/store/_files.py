@@ -1,9 +1,9 @@
-"""The store on disk: one file a calibration, one file an event, each named by its content; and the index of them.
+"""The store on disk: one file per calibration and per event, each named by its content; and their index.
 
-``units/SERIAL/DATE_HASH.json`` is a calibration that any command reads, with what the store knows of it under the key
-``store``. ``events/DATE_HASH.json`` is an event. A name holds the beginning of the sha256 of the file's bytes: two
-processes that add at once cannot meet at one name with different content, and a file that was cut or changed by hand
-is noticed. ``index.json`` repeats what the files say; it is rebuilt from them and may be deleted at any time.
+``units/SERIAL/DATE_HASH.json`` is a calibration that any command reads, with the store's own data under the key
+``store``. ``events/DATE_HASH.json`` is an event. A name contains the beginning of the sha256 of the file's bytes: two
+processes that add at once cannot write different content under one name, and a file that was truncated or edited by
+hand is noticed. ``index.json`` repeats what the files say; it is rebuilt from them and may be deleted at any time.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from smartshoe.files.gate import limits, parsed_json, read_bytes, read_text
 INDEX, UNITS, EVENTS = "index.json", "units", "events"
 INDEX_SCHEMA, EVENT_SCHEMA = "smartshoe.store.index/1", "smartshoe.store.event/1"
 HASH_DIGITS = 16
-LONGEST_SERIAL = 80  # every letter may take three bytes of a name's 255
+LONGEST_SERIAL = 80  # once escaped, every character may take three of the 255 bytes of a file name
 
 
 def folder_name(serial_number: str) -> str:
-    """The folder of a unit; anything but letters, digits, '-', '_' and inner '.' is escaped, so no name leads out.
+    """The folder name of a unit; all but letters, digits, '-', '_' and inner '.' is escaped, so no name leads outside.
 
-    Raises `UsageError` where there is no serial number or it is too long.
+    Raises `UsageError` where the serial number is empty or too long.
     """
     if not serial_number.strip():
         raise UsageError("the calibration has no serial number: give one with --serial-number, as on the unit's label")
@@ -45,19 +45,19 @@ def folder_name(serial_number: str) -> str:
 
 
 def fingerprint(calibration: Mapping[str, Any]) -> str:
-    """sha256 of a calibration's object, whatever the store says of it."""
+    """sha256 of a calibration's object, ignoring the store's own data in it."""
     bare = {key: value for key, value in calibration.items() if key != "store"}
     return hashlib.sha256(json.dumps(bare, sort_keys=True).encode()).hexdigest()
 
 
 def _write_named(folder: Path, date: str, content: Mapping[str, Any]) -> Path:
     text = json_text(content)
-    # ':' is no letter of a file's name everywhere.
+    # Not every file system allows ':' in a name.
     name = f"{date.replace(':', '')}_{hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]}.json"
     path = folder / name
     try:
         make_folder(folder)
-        if not path.exists():  # the same name is the same content
+        if not path.exists():  # the same name means the same content
             write_text(path, text)
     except (OSError, UsageError) as error:
         raise UsageError(
@@ -68,7 +68,7 @@ def _write_named(folder: Path, date: str, content: Mapping[str, Any]) -> Path:
 
 
 def write_calibration(root: Path, calibration: Mapping[str, Any], store: Mapping[str, Any]) -> Path:
-    """Write a calibration's object with the store's key; returns the path. Nothing is ever overwritten."""
+    """Write a calibration's object with the store's data added; returns the path. Nothing is ever overwritten."""
     folder = root / UNITS / folder_name(store["serial_number"])
     return _write_named(folder, store["date"], {**calibration, "store": dict(store)})
 
@@ -80,22 +80,22 @@ def write_event(root: Path, event: HistoryEvent) -> Path:
 
 
 def listing(root: Path) -> dict[str, tuple[int, int]]:
-    """Every file of the store, by its path within it: (size, time of change in ns), which a later change alters."""
+    """Every file of the store, by its path within it: (size, modification time in ns), to detect later changes."""
     found: dict[str, tuple[int, int]] = {}
     for pattern in (f"{UNITS}/*/*.json", f"{EVENTS}/*.json"):
         for path in sorted(root.glob(pattern)):
-            if path.name.startswith("."):  # a file that is being written
+            if path.name.startswith("."):  # a file still being written
                 continue
             try:
                 state = path.stat()
-            except FileNotFoundError:  # taken away since the folder was listed
+            except FileNotFoundError:  # removed since the folder was listed
                 continue
             found[path.relative_to(root).as_posix()] = (state.st_size, state.st_mtime_ns)
     return found
 
 
 def read_item(root: Path, relative: str) -> dict[str, Any]:
-    """What the index keeps of a file; raises `InputError` where the file is not as it was added."""
+    """The index's item for a file; raises `InputError` where the file has changed since it was added."""
     path = root / relative
     content = read_bytes(path, at_most=limits().json_bytes)
     if hashlib.sha256(content).hexdigest()[:HASH_DIGITS] != path.stem.rpartition("_")[2]:
@@ -115,10 +115,10 @@ def read_item(root: Path, relative: str) -> dict[str, Any]:
 def made_of(
     root: Path, relative: str, state: tuple[int, int], cached: object
 ) -> tuple[dict[str, Any], Entry | HistoryEvent]:
-    """A file's item and what it is: by the index where what is ``cached`` there is of this very ``state``.
+    """A file's index item and the entry or event in it; ``cached``, the index's own, is used where ``state`` matches.
 
-    An index that is damaged costs time and no calibration: the file itself is read. Raises `InputError` where that is
-    no file of a store.
+    A damaged index costs only time: the file itself is read instead. Raises `InputError` where that is not a file of a
+    store.
     """
     if isinstance(cached, dict) and cached.get("state") == list(state):
         with suppress(InputError, KeyError):
@@ -174,7 +174,7 @@ def _text(item: Mapping[str, Any], key: str) -> str:
 
 
 def read_index(root: Path) -> dict[str, Any]:
-    """The index's items by file, {} where there is none or it cannot be used: it only saves time."""
+    """The index's items by file; {} where there is no usable index, which only costs time."""
     try:
         found = parsed_json(read_text(root / INDEX, "a store's index"))
         if found["schema"] == INDEX_SCHEMA and isinstance(found["files"], dict):
@@ -185,9 +185,9 @@ def read_index(root: Path) -> dict[str, Any]:
 
 
 def write_index(root: Path, files: Mapping[str, Any]) -> str:
-    """Write the index where the folder can be written to; a store that is only read goes without.
+    """Write the index if the folder is writable; a read-only store works without one.
 
-    Returns what went wrong, '' where nothing did: without an index all is found, only later.
+    Returns what went wrong, or ''. Without an index everything is still found, only more slowly.
     """
     if not os.access(root, os.W_OK | os.X_OK):
         return ""

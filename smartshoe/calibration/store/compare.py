@@ -1,4 +1,4 @@
-"""Two calibrations against each other: which parameters differ, by how many sd, and what it means in newtons."""
+"""Compares two calibrations: which parameters differ, by how many sd, and what that means in newtons."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.first_order import simulate
 from smartshoe.models.parameter import Parameter, finite_or_none
 
-RATES_N_PER_S = (50.0, 100.0, 200.0, 400.0, 600.0, 800.0)  # of the paper's dynamic protocol
+RATES_N_PER_S = (50.0, 100.0, 200.0, 400.0, 600.0, 800.0)  # those of the paper's dynamic protocol
 SAMPLES_OF_A_RAMP = 400
-CHANGED = 0.01  # chance that errors alone make two calibrations so different, below which they are called different
+CHANGED = 0.01  # p-value below which two calibrations are called different
 DERIVATIVE_STEP = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterDifference:
-    """``second`` less ``first``: ``difference`` with ``sd``; ``in_sd`` is their ratio, NaN where no sd is known."""
+    """``second`` minus ``first``: ``difference`` with ``sd``; ``in_sd`` is their ratio, NaN where no sd is known."""
 
     name: str
     first: Parameter
@@ -41,12 +41,12 @@ class ParameterDifference:
 
     @property
     def in_sd(self) -> float:
-        """The difference over its sd."""
+        """The difference divided by its sd."""
         return self.difference / self.sd if self.sd > 0.0 else math.nan
 
     @property
     def percent(self) -> float:
-        """The difference in percent of the first value."""
+        """The difference as a percentage of the first value."""
         return 100.0 * self.difference / abs(self.first.value) if self.first.value else math.nan
 
     def to_dict(self) -> dict[str, Any]:
@@ -63,9 +63,9 @@ class ParameterDifference:
 
 @dataclass(frozen=True, slots=True)
 class ForceDifference:
-    """A triangle to the top load and back at ``rate_n_per_s``: the second's force less the first's, in N.
+    """The second's force minus the first's, in N, under a triangle to the top load and back at ``rate_n_per_s``.
 
-    ``largest_n`` keeps its sign and is at the load ``at_load_n``; ``sd_n`` is its standard deviation by both
+    ``largest_n`` is signed and occurs at the load ``at_load_n``; ``sd_n`` is its standard deviation by both
     calibrations' covariances, NaN where they are not known.
     """
 
@@ -88,7 +88,7 @@ class ForceDifference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What `compare` finds; ``p_value`` tests a1, b0 and b1 together, NaN without covariances."""
+    """The result of `compare`; ``p_value`` tests a1, b0 and b1 together, NaN without covariances."""
 
     parameters: tuple[ParameterDifference, ...]
     forces: tuple[ForceDifference, ...]
@@ -98,7 +98,7 @@ class Comparison:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.comparison/1."""
+        """The comparison as a JSON object, schema smartshoe.comparison/1."""
         return {
             "schema": "smartshoe.comparison/1",
             "parameters": {item.name: item.to_dict() for item in self.parameters},
@@ -111,11 +111,11 @@ class Comparison:
 
 
 def compare(first: Calibration, second: Calibration, rates_n_per_s: Sequence[float] = RATES_N_PER_S) -> Comparison:
-    """Differences of parameters, and of the forces that the two give for one and the same reading.
+    """Differences of two calibrations' parameters, and of the forces that they give for the same reading.
 
-    The reading is what the first calibration's unit gives under a triangle from 0 to the largest load that both have
-    seen, so the first's force is that load; each is used with its own zero, whose difference stands apart. The errors
-    of the two are taken as independent. Raises `UsageError` for readings in different units.
+    The reading is that of the first calibration's unit under a triangle from 0 to the largest load that both have seen,
+    so that the first's force equals that load. Each is used with its own zero; the difference of the zeros is listed
+    separately. The errors of the two are assumed independent. Raises `UsageError` for readings in different units.
     """
     require_one_reading_unit([first, second])
     ours, theirs = quantities(first), quantities(second)
@@ -151,7 +151,7 @@ def _says(forces: Sequence[ForceDifference], p_value: float, top_n: float) -> st
 
 
 def _together(first: Calibration, second: Calibration) -> float:
-    """Chance that independent errors alone make a1, b0, b1 differ so much (chi-square, 3 degrees of freedom)."""
+    """Probability that independent errors alone make a1, b0, b1 differ so much (chi-square, 3 degrees of freedom)."""
     ours, theirs = coefficient_covariance(first), coefficient_covariance(second)
     if ours is None or theirs is None:
         return math.nan
@@ -159,7 +159,7 @@ def _together(first: Calibration, second: Calibration) -> float:
 
     difference = np.array([getattr(second, name) - getattr(first, name) for name in COEFFICIENTS])
     both = ours + theirs
-    # Scaled to a correlation before it is solved: the coefficients are of very different sizes.
+    # Scaled to a correlation before solving, since the coefficients differ widely in size.
     size = np.sqrt(np.diag(both))
     scaled = difference / size
     distance = float(scaled @ np.linalg.pinv(both / np.outer(size, size), rcond=1e-12, hermitian=True) @ scaled)
@@ -201,7 +201,7 @@ def _linear(ours: Array, theirs: Array, time_s: Array, load_n: Array) -> Array:
 
 
 def _sd(first: Calibration, second: Calibration, time_s: Array, load_n: Array) -> Array:
-    """Standard deviation (n,) of the force difference, by the derivatives with respect to either's coefficients."""
+    """Standard deviation (n,) of the force difference, by the derivatives with respect to both sets of coefficients."""
     variance = np.zeros(time_s.size)
     pair = (_coefficients(first), _coefficients(second))
     start = _linear(*pair, time_s, load_n)
@@ -220,10 +220,10 @@ def _sd(first: Calibration, second: Calibration, time_s: Array, load_n: Array) -
 
 
 def _extended(first: Calibration, second: Calibration, time_s: Array, load_n: Array) -> Array:
-    """The difference (n,) where one of the two has effects: the first's reading through both filters."""
+    """The force difference (n,) where either has effects: the first's reading passed through both filters."""
     bare = [_without_zero(calibration) for calibration in (first, second)]
     model = bare[0].model()
-    step_s = float(time_s[1])  # from 0
+    step_s = float(time_s[1])  # the first time is 0
     reading = model.reading(Conditions(time_s, load_n / model.full_scale_load_n, step_s))
     ours, theirs = (calibration.compensator(1.0 / step_s).apply(reading) for calibration in bare)
     return np.asarray(theirs - ours)

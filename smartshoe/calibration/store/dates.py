@@ -1,4 +1,4 @@
-"""Dates of calibrations and events: ISO 8601 in, moments in UTC inside, the shortest form that says it all out."""
+"""Dates of calibrations and events: read from ISO 8601, stored as UTC moments, written in the shortest exact form."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ DAY_S = 86400.0
 
 
 def moment(given: str | date | datetime, what: str = "the date") -> datetime:
-    """``given`` as a moment in UTC; a date alone is its midnight, a time without a zone is taken as UTC.
+    """``given`` as a moment in UTC; a date alone means midnight, a time without a zone is taken as UTC.
 
-    Raises `UsageError` naming ``what`` where it is no ISO date.
+    Raises `UsageError` naming ``what`` where it is not an ISO date.
     """
     if isinstance(given, str):
         try:
@@ -27,7 +27,7 @@ def moment(given: str | date | datetime, what: str = "the date") -> datetime:
 
 
 def iso(at: datetime) -> str:
-    """The moment as text: the date alone at midnight, else with the time as far as it is not zero."""
+    """The moment as text: only the date at midnight, else with the time, omitting trailing zero parts."""
     if at.time() == time():
         return at.date().isoformat()
     precision = "minutes" if not (at.second or at.microsecond) else "seconds" if not at.microsecond else "microseconds"
@@ -35,5 +35,5 @@ def iso(at: datetime) -> str:
 
 
 def days_between(start: datetime, end: datetime) -> float:
-    """Days from ``start`` to ``end``, negative where it is earlier."""
+    """Days from ``start`` to ``end``, negative where ``end`` is earlier."""
     return (end - start).total_seconds() / DAY_S

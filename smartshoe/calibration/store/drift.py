@@ -1,4 +1,4 @@
-"""How a unit's parameters move over its life: a trend, steps at its repairs, jumps that no repair explains."""
+"""Drift of a unit's parameters over its life: a trend, steps at repairs, and jumps that no repair explains."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from smartshoe.models.parameter import Parameter
 
 DAYS_OF_A_YEAR = 365.25
 ROUNDING = 1e-12
-JUMP_CHANCE = 0.01  # of a jump being reported anywhere in a history that has none
-LEAST_FREEDOM = 2  # calibrations beyond levels and slope, to judge a jump by
+JUMP_CHANCE = 0.01  # probability of reporting a jump anywhere in a history that has none
+LEAST_FREEDOM = 2  # degrees of freedom required to judge a jump
 
 
 @dataclass(frozen=True, slots=True)
 class DriftStep:
-    """A change at a moment: ``change`` (in the quantity's unit) at a repair, or between two calibrations."""
+    """A step of a quantity (``change``, in its unit) at a repair, or between two calibrations."""
 
     date: datetime
     change: Parameter
@@ -35,7 +35,7 @@ class DriftStep:
 
     @property
     def is_significant(self) -> bool:
-        """Whether its 95 % interval leaves out zero."""
+        """Whether the 95 % interval of the change excludes zero."""
         return _leaves_out_zero(self.change)
 
     def to_dict(self) -> dict[str, Any]:
@@ -45,12 +45,12 @@ class DriftStep:
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """A quantity over the life: ``values`` and ``sds`` (n,) at ``days`` (n,) since the first calibration.
+    """A quantity over the unit's life: ``values`` and ``sds`` (n,) at ``days`` (n,) since the first calibration.
 
-    ``pieces`` (n,) number the segments between ``repairs`` and ``jumps``, each with a level of its own; ``per_year``
-    is the slope that they share, None where it cannot be estimated; ``levels`` are what the fit says at day 0, one a
-    piece. ``scatter`` is the spread about the fit over what the sds explain (1: all of it; NaN where there is no sd or
-    nothing is left to judge by).
+    ``pieces`` (n,) number the segments between ``repairs`` and ``jumps``, each with its own level; ``per_year`` is
+    their common slope, None where it cannot be estimated; ``levels`` are the fitted values at day 0, one per segment.
+    ``scatter`` is the spread about the fit relative to the sds (1: fully explained by them; NaN where there are no sds
+    or no degrees of freedom).
     """
 
     name: str
@@ -68,11 +68,11 @@ class Trend:
 
     @property
     def moves(self) -> bool:
-        """Whether the slope's 95 % interval leaves out zero."""
+        """Whether the 95 % interval of the slope excludes zero."""
         return self.per_year is not None and _leaves_out_zero(self.per_year)
 
     def fitted(self, days: Array, piece: int) -> Array:
-        """The fit at ``days`` (m,) in a piece."""
+        """The fitted values (m,) at ``days`` (m,) in a segment."""
         slope = 0.0 if self.per_year is None else self.per_year.value / DAYS_OF_A_YEAR
         return np.asarray(self.levels[piece] + slope * days)
 
@@ -92,7 +92,7 @@ class Trend:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """A unit's life: its calibrations, what happened to it, and a trend for every quantity that all of them have."""
+    """A unit's life: its calibrations, its events, and a trend for every quantity that all calibrations have."""
 
     serial_number: str
     entries: tuple[Entry, ...]
@@ -102,7 +102,7 @@ class Drift:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.drift/1."""
+        """The drift as a JSON object, schema smartshoe.drift/1."""
         return {
             "schema": "smartshoe.drift/1",
             "serial_number": self.serial_number,
@@ -115,10 +115,10 @@ class Drift:
 
 
 def drift(store: CalibrationStore, serial_number: str) -> Drift:
-    """How the unit's parameters moved; raises `UsageError` where there are fewer than two calibrations of it."""
+    """The drift of a unit's parameters; raises `UsageError` where it has fewer than two calibrations."""
     entries, events = store.history(serial_number), store.events(serial_number)
     if not entries:
-        store.latest(serial_number)  # says what the store has instead
+        store.latest(serial_number)  # its error lists what the store has
     if len(entries) < 2:
         raise UsageError(
             f"unit {serial_number} has one calibration in {store}: a drift needs two at least, add another"
@@ -144,14 +144,14 @@ def _followed(calibrations: Sequence[Calibration]) -> list[tuple[str, str, Array
         if all(name in other for other in every):
             values = np.array([other[name].value for other in every])
             sds = np.array([other[name].sd for other in every])
-            if np.ptp(values) > 0.0 or np.any(sds > 0.0):  # c = 1, fixed in all of them, does not drift
+            if np.ptp(values) > 0.0 or np.any(sds > 0.0):  # c = 1, fixed in all calibrations, does not drift
                 found.append((name, first.unit, values, sds))
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class _TrendFit:
-    """Weighted least squares: theta (p,), its covariance with the scatter in it, degrees of freedom, scatter."""
+    """Weighted least squares: theta (p,), its covariance including the scatter, degrees of freedom, scatter."""
 
     theta: Array
     covariance: Array
@@ -159,7 +159,7 @@ class _TrendFit:
     scatter: float
 
     def parameter(self, contrast: Array, unit: str) -> Parameter:
-        """contrast @ theta with its interval (Student's t: the scatter between calibrations is itself estimated)."""
+        """contrast @ theta with its interval, by Student's t, since the scatter between calibrations is estimated."""
         from scipy.special import stdtrit
 
         value = float(contrast @ self.theta)
@@ -170,10 +170,10 @@ class _TrendFit:
 
 
 def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
-    """None where the design does not determine every coefficient.
+    """Weighted least squares of ``values`` (n,); None where the design does not determine every coefficient.
 
-    What the sds do not explain widens the error bars (Birge 1932: never narrows them): a calibration's sd knows
-    nothing of how the unit was placed under the anvil.
+    Scatter beyond the sds widens the error bars (Birge 1932: never narrows them): a calibration's sd does not cover how
+    the unit was placed under the anvil.
     """
     known = bool(np.isfinite(sds).all() and (sds > 0.0).all())
     weight = 1.0 / sds if known else np.ones(values.size)
@@ -185,7 +185,7 @@ def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
     theta = np.linalg.lstsq(scaled, values * weight, rcond=None)[0]
     left = values * weight - scaled @ theta
     freedom = values.size - design.shape[1]
-    rounding = ROUNDING * float(np.abs(values * weight).max())  # what is exact is known no better than its digits
+    rounding = ROUNDING * float(np.abs(values * weight).max())  # even exact values are known only to their digits
     spread = max(math.sqrt(float(left @ left) / freedom), rounding) if freedom > 0 else math.nan
     widen = max(spread, 1.0) if known else spread
     covariance = widen**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(size, size)
@@ -202,7 +202,7 @@ def _trend(
     dates: Sequence[datetime],
     repairs: Sequence[HistoryEvent],
 ) -> Trend:
-    # Numbered without gaps: of two repairs with no calibration between, the last one counts.
+    # Numbered without gaps: of two repairs with no calibration in between, only the last one counts.
     pieces = np.unique(lives, return_inverse=True)[1].astype(np.intp)
     jumped: set[int] = set()
     while (at := _jump(days, values, sds, pieces)) is not None:
@@ -233,16 +233,16 @@ def _trend(
 
 
 def _fit_of(days: Array, values: Array, sds: Array, pieces: Index) -> tuple[_TrendFit, Array | None]:
-    """Levels of the pieces (at the mean day) and a slope that they share; the contrast of the slope per day.
+    """Levels of the segments (at the mean day) and their common slope; also the slope's contrast per day.
 
-    Where the slope is not determined (each piece has one date) the levels alone, and None.
+    Where the slope is not determined (each segment has one date), the levels alone, and None.
     """
     levels = (pieces[:, None] == np.arange(int(pieces[-1]) + 1)).astype(float)
     found = _fit(np.column_stack([levels, days - days.mean()]), values, sds)
     if found is not None:
         return found, np.eye(found.theta.size)[-1]
     found = _fit(levels, values, sds)
-    if found is None:  # a level a piece is always determined: nothing but broken numbers gets here
+    if found is None:  # levels alone are always determined, so only non-finite numbers get here
         raise UsageError(
             "the calibrations hold numbers that no level fits: look at them with smartshoe calibrations list"
         )
@@ -250,11 +250,12 @@ def _fit_of(days: Array, values: Array, sds: Array, pieces: Index) -> tuple[_Tre
 
 
 def _jump(days: Array, values: Array, sds: Array, pieces: Index) -> int | None:
-    """The first calibration after the strongest step within a piece, where chance makes one less than `JUMP_CHANCE`.
+    """Index of the first calibration after the strongest step within a segment; None unless it is significant.
 
-    Every gap between two calibrations is tried, and the chance is multiplied by their number (Bonferroni).
+    Every gap between two calibrations is tried, and the probability is multiplied by their number (Bonferroni); it must
+    be below `JUMP_CHANCE`.
     """
-    from scipy.special import stdtr  # Student's t: scipy.stats takes a second to come
+    from scipy.special import stdtr  # Student's t; importing scipy.stats takes a second
 
     gaps = [k for k in range(1, values.size) if pieces[k] == pieces[k - 1] and days[k] > days[k - 1]]
     best: tuple[float, int] | None = None
@@ -307,7 +308,7 @@ def _trend_says(
 
 
 def _says(serial_number: str, entries: Sequence[Entry], trends: dict[str, Trend], top_n: float) -> str:
-    """One sentence: what the drift of the static gain means in newtons."""
+    """One sentence: what the drift of the static gain means in newtons at the load ``top_n``."""
     span = days_between(entries[0].date, entries[-1].date)
     start = f"unit {serial_number}, {len(entries)} calibrations over {span:.0f} days"
     gain = trends.get(STATIC_GAIN)

@@ -1,4 +1,4 @@
-"""What is followed of a unit over its life: its identified parameters, its static gain and its zero."""
+"""The quantities tracked over a unit's life: its identified parameters, its static gain and its zero."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COEFFICIENTS = ("a1", "b0", "b1")
 
 
 def coefficient_covariance(calibration: Calibration) -> Array | None:
-    """Covariance (3, 3) of a1, b0, b1; None where the calibration does not say it."""
+    """Covariance (3, 3) of a1, b0, b1; None where the calibration does not state it."""
     names = list(calibration.parameters)
     if any(name not in names for name in COEFFICIENTS) or len(calibration.covariance) != len(names):
         return None
@@ -27,7 +27,7 @@ def coefficient_covariance(calibration: Calibration) -> Array | None:
 
 
 def quantities(calibration: Calibration) -> dict[str, Parameter]:
-    """Every number that is followed, the static gain b1/a1 (N per reading) first and the zero (a reading) last."""
+    """Every tracked quantity by name, the static gain b1/a1 (N per reading) first and the zero (a reading) last."""
     a1, b1 = calibration.a1, calibration.b1
     covariance = coefficient_covariance(calibration)
     gain, gain_sd = b1 / a1, math.nan
@@ -47,7 +47,7 @@ def quantities(calibration: Calibration) -> dict[str, Parameter]:
 
 
 def require_one_reading_unit(calibrations: Sequence[Calibration]) -> None:
-    """Raise `UsageError` where the calibrations are not of one kind of reading."""
+    """Raise `UsageError` where the calibrations' readings are in different units."""
     symbols = sorted({calibration.reading_unit.symbol for calibration in calibrations})
     if len(symbols) > 1:
         raise UsageError(
@@ -57,7 +57,7 @@ def require_one_reading_unit(calibrations: Sequence[Calibration]) -> None:
 
 
 def top_load_n(calibrations: Sequence[Calibration]) -> float:
-    """The largest load that all calibrations have seen, the paper's 800 N where none says."""
+    """The largest load that all calibrations have seen; the paper's 800 N where none states it."""
     from smartshoe.calibration._calibration import USUAL_FULL_SCALE_N
 
     tops = [c.load_range_n[1] for c in calibrations if c.load_range_n is not None and c.load_range_n[1] > 0.0]

@@ -1,4 +1,4 @@
-"""Validation: how good a calibration is, per loading rate, against the best that a static gain could do."""
+"""Validation: how good a calibration is, per loading rate, compared with the best static gain."""
 
 from smartshoe.calibration.validation._validation import ForceTrace, RateResult, Validation, validate
 

@@ -14,7 +14,7 @@ def rmse(error: Array) -> float:
 
 
 def improvement_percent(before: float, after: float) -> float | None:
-    """P% of Chinimilli 2016, Section VI: 100 (before - after)/before; None where there was no error before."""
+    """P% of Chinimilli 2016, Section VI: 100 (before - after)/before; None where ``before`` is 0."""
     return 100.0 * (before - after) / before if before > 0 else None
 
 
@@ -26,14 +26,15 @@ def best_static(reading: Array, load_n: Array) -> tuple[float, float]:
 
 
 def loop_area(load_n: Array, estimate_n: Array) -> float:
-    """Area in N^2 enclosed by the closed path (load, estimate), by the shoelace formula; positive either way round."""
+    """Area in N^2 enclosed by the closed path (load, estimate), by the shoelace formula; never negative."""
     return float(0.5 * abs(np.dot(load_n, np.roll(estimate_n, -1)) - np.dot(estimate_n, np.roll(load_n, -1))))
 
 
 def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_down: Array) -> float | None:
-    """Largest difference in N between loading and unloading estimate at equal load; None where no load is shared.
+    """Largest difference in N between loading and unloading estimate at equal load.
 
-    Both branches are averaged in bins of load, so that the noise of single samples does not set the figure.
+    None where the loads do not overlap. Both branches are averaged in bins of load, so that noise of single samples
+    does not determine the result.
     """
     low = max(load_up.min(), load_down.min())
     high = min(load_up.max(), load_down.max())
@@ -44,7 +45,7 @@ def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_do
     def branch(load: Array, estimate: Array) -> Array:
         which = np.digitize(load, edges)
         counts = np.bincount(which, minlength=edges.size + 1)[1 : edges.size]
-        # The mean error, not the mean estimate: where in a bin the samples lie must not matter.
+        # The mean error, not the mean estimate, so that the samples' position in a bin does not matter.
         sums = np.bincount(which, weights=estimate - load, minlength=edges.size + 1)[1 : edges.size]
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
@@ -53,11 +54,11 @@ def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_do
 
 
 def delay_s(load_n: Array, estimate_n: Array, sample_time_s: float) -> float | None:
-    """Time by which the estimate trails the load: least squares of the estimate on load, slope of the load and one.
+    """Time in s by which the estimate lags the load: least squares of the estimate on load, its slope and a constant.
 
-    The first-order expansion of a shift, good while the delay is short beside the ramps; gain and offset have terms
-    of their own, so that they do not pass for a delay. None where the load does not move, where the estimate does not
-    follow it (its gain on the load holds 0 within 95 %), and where the delay would be longer than the record.
+    This is the first-order expansion of a shift, valid while the delay is short compared with the ramps; gain and
+    offset have terms of their own, so that they do not pass for a delay. None where the load does not move, where the
+    estimate does not follow it (the 95 % interval of its gain includes 0), and where the delay would exceed the record.
     """
     slope = np.gradient(load_n, sample_time_s)
     design = np.column_stack([load_n, slope, np.ones_like(load_n)])
@@ -70,7 +71,7 @@ def delay_s(load_n: Array, estimate_n: Array, sample_time_s: float) -> float | N
         return None
     error = estimate_n - columns @ found
     variance = float(error @ error) / (load_n.size - 3)
-    # The pseudo-inverse and not the normal matrix, whose condition is the square of the columns'.
+    # The pseudo-inverse, since the normal matrix has the square of the columns' condition number.
     gain_sd = float(np.sqrt(variance) * np.linalg.norm(np.linalg.pinv(columns)[0]))
     if abs(found[0]) <= NORMAL_95 * gain_sd:
         return None

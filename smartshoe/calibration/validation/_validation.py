@@ -1,4 +1,4 @@
-"""`validate`: raw, statically scaled and compensated errors of a calibration on recordings."""
+"""`validate`: errors of a calibration on recordings, for the raw, the statically scaled and the compensated force."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from smartshoe.signals.loading import Cycle, by_rate, cycles
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FEWEST_SAMPLES = 3  # a line goes through any two
+FEWEST_SAMPLES = 3  # a line fits any two exactly
 
 
 @dataclass(frozen=True, eq=False)
 class ForceTrace:
-    """One recording's signals in newton (n,); ``valid`` marks samples that were logged.
+    """One recording's signals in N (n,); ``valid`` marks samples that were logged.
 
-    Reference, raw (reading on the calibration's scale), best static line, compensated.
+    Reference load, raw force (reading on the calibration's scale), best static line, and compensated force.
     """
 
     name: str
@@ -68,7 +68,7 @@ class RateResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Validation(Summarised):
-    """The verdict on a calibration: ``overall``, ``rates`` in ascending order, and the signals behind them."""
+    """How good a calibration is: ``overall``, ``rates`` in ascending order, and the signals behind them."""
 
     unit: str | None
     overall: RateResult
@@ -80,7 +80,7 @@ class Validation(Summarised):
     reading_unit: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Schema ``smartshoe.validation/1``."""
+        """The validation as a JSON object, schema ``smartshoe.validation/1``."""
         return {
             "schema": "smartshoe.validation/1",
             "unit": self.unit,
@@ -92,7 +92,7 @@ class Validation(Summarised):
         }
 
     def plot(self) -> Figure:
-        """A figure: by recording, the force with and without compensation over the reference load."""
+        """A figure with, for each recording, the force with and without compensation over the reference load."""
         figure, axes = panels(len(self.traces))
         for axis, trace in zip(axes, self.traces, strict=True):
             load_n = np.where(trace.valid, trace.load_n, np.nan)
@@ -197,7 +197,7 @@ def validate(
 
 
 def _require_movement(label: str, readings: list[Array], loads: list[Array], valid: list[Mask]) -> None:
-    """Raise `InputError` where reading or load is the same throughout, or samples are so few: a line tells nothing."""
+    """Raise `InputError` where reading or load is constant, or there are too few samples for a line."""
     for signals, what, mend in (
         (readings, "reading", "check that the unit is connected and that this is its column"),
         (loads, "load", "give a recording in which it rises and falls"),
@@ -218,7 +218,10 @@ def _mean(values: list[float]) -> float | None:
 def _judge(
     rate: float | None, found: list[tuple[ForceTrace, Cycle]], full_scale_n: float, whole: tuple[ForceTrace, ...] = ()
 ) -> RateResult:
-    """Errors over ``whole`` records, or over the given cycles; loops over the cycles in either case."""
+    """Errors over ``whole`` records where given, else over the given cycles.
+
+    The figures of loops are over the cycles in either case.
+    """
     spans = [(t, slice(None)) for t in whole] or [(t, slice(c.start, c.stop)) for t, c in found]
 
     def errors(name: str) -> Array:

@@ -1,1 +1,4 @@
-"""A shoe on a serial port: the port, its reader thread, what comes as blocks and events; `shoe.SerialShoe`."""
+"""A shoe on a serial port: the port, its reader thread, and the blocks and events it produces.
+
+See `shoe.SerialShoe`.
+"""

@@ -1,4 +1,4 @@
-"""From decoded samples and their arrival to blocks and events; no I/O, so that it runs on any clock."""
+"""Turns decoded samples and their arrival times into blocks and events; without I/O, so that it runs on any clock."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from smartshoe.errors import DeviceError
 from smartshoe.units import Unit
 
 RATED_S = 1.0
-# Text lines' unit of time is a guess: a clock that seems this much slower than the host's is in another one.
+# The time unit of text lines is a guess: a clock that seems this much slower than the host's is in another unit.
 SLOWEST_CLOCK = 0.1
 WATCHED_S = 3.0
 
 
 class Assembler:
-    """Scales and names the samples, keeps their time increasing over restarts, fits the device's clock to the host's.
+    """Scales and names samples, keeps their time increasing over restarts, fits the device's clock to the host's.
 
-    ``first`` are samples of the stream, for their names and unit; ``to`` is the unit of the blocks, the samples' own
-    where it is None. ``counts_samples`` is False where the device has no counter of its own (text lines): gaps are
-    then told from the time alone. A restarted device counts from zero: its time goes on where the host's clock says
-    that it must be, and the clock is fitted anew. ``apart`` is the clock's.
+    ``first`` are samples of the stream, from which names and unit are taken; ``to`` is the unit of the blocks, that of
+    the samples where it is None. ``counts_samples`` is False where the device has no sample counter (text lines): gaps
+    are then found from the time alone. A restarted device counts from zero: its time is continued where the host's
+    clock puts it, and the clock is fitted anew. ``apart`` is passed to the `DeviceClock`.
     """
 
     def __init__(
@@ -53,12 +53,12 @@ class Assembler:
         self._pace: LinePace | None = None
         self._steps_s: list[float] = []
         self._is_rated = False
-        self._watched_s = [0.0, 0.0]  # of the device's clock, of the host's, while samples flowed
+        self._watched_s = [0.0, 0.0]  # elapsed by the device's clock and by the host's, while samples arrived
         self._shift_s = 0.0
         self._last: tuple[int, int, float, float] | None = None  # boot, sequence, time and arrival of the last sample
 
     def take(self, samples: Samples, arrival_s: ArrayLike) -> tuple[Block, list[ShoeEvent]]:
-        """One block of ``samples`` (one at least), come at ``arrival_s`` (n,), and what befell the stream before."""
+        """One block of ``samples`` (at least one), arrived at ``arrival_s`` (n,), and the events that preceded it."""
         events: list[ShoeEvent] = []
         scaled = self._scaled(samples)
         arrivals_s = np.array(np.broadcast_to(np.asarray(arrival_s, dtype=np.float64), len(scaled)))
@@ -77,17 +77,17 @@ class Assembler:
 
     @property
     def rate_hz(self) -> float | None:
-        """Samples a second as their times say; None before two of them have come."""
+        """Samples per second, measured from their times; None before two samples have arrived."""
         return None if self._pace is None else 1.0 / self._pace.period_s
 
     def _scaled(self, samples: Samples) -> Samples:
         return samples if self._information is None else self._information.scale(samples)
 
     def _take_boot(self, samples: Samples, part: slice, arrival_s: Array, events: list[ShoeEvent]) -> Block:
-        """Samples of one boot."""
+        """The block of the samples ``part`` (one boot of the device); appends to ``events``."""
         sequence, device_s, boot = samples.sequence[part], samples.device_time_s[part], int(samples.boot[part][0])
         if self._last is not None and boot != self._last[0]:
-            # A restart within one arrival still has to move on: time increases, if by a microsecond.
+            # Time must increase even over a restart within one arrival, if only by a microsecond.
             resumes_s = self._last[2] + max(float(arrival_s[0]) - self._last[3], 1e-6)
             self._shift_s = resumes_s - float(device_s[0])
             self._last = None
@@ -119,14 +119,14 @@ class Assembler:
         ]
 
     def _rate(self, steps_s: Array) -> None:
-        """Measure the pace over all steps so far, until they are `RATED_S` without their holes."""
+        """Update the measured rate from steps (n,) between samples, until `RATED_S` without gaps have been seen."""
         self._steps_s += steps_s.tolist()
         so_far_s = np.array(self._steps_s)
         self._pace = LinePace.of(so_far_s)
         self._is_rated = bool(np.sum(so_far_s / self._pace.samples(so_far_s)) >= RATED_S)
 
     def _require_seconds(self, time_s: float, arrival_s: float) -> None:
-        """Raises `DeviceError` where text lines' times go by far slower than the host's clock."""
+        """Raise `DeviceError` where the times of text lines run far slower than the host's clock."""
         if self._counts_samples or self._last is None or arrival_s - self._last[3] > WATCHED_S:
             return
         self._watched_s[0] += time_s - self._last[2]

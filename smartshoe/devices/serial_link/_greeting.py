@@ -1,4 +1,4 @@
-"""The first words with a shoe: which format it speaks, what it says of itself, its first samples."""
+"""The first exchange with a shoe: which format it speaks, its information, its first samples."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from smartshoe.devices.wire.samples import Samples
 from smartshoe.devices.wire.sniff import guess, looks_like
 from smartshoe.errors import DeviceTimeoutError
 
-# A device that is silent until it is told to start gets this long to begin by itself.
+# How long a device may take to send by itself before it is sent a start command.
 LISTEN_S = 0.3
 ASK_AGAIN_S = 1.0
-# A device that takes no commands tells of itself once a second (docs/wire.md); one telling may be lost.
+# A device that takes no commands sends its information once a second (docs/wire.md); one frame may be lost.
 INFORMATION_WAIT_S = 2.2
-# Text lines do not say their rate: times rounded to a millisecond give it within 0.1 % over this long.
+# Text lines do not state their rate: times rounded to a millisecond give it within 0.1 % over this long.
 RATED_S = 1.0
-# They may come in bursts: as long is waited for that second, in the device's time.
+# Lines may arrive in bursts, so waiting for that second of device time may take this long.
 RATING_WAIT_S = 3.0
 SNIFFED_BYTES = 4096
 
@@ -32,7 +32,7 @@ Decoder = FrameDecoder | LineDecoder
 
 @dataclass(eq=False)
 class Greeting:
-    """How the shoe talks: its decoder, its information where it has any, the samples so far and when they came."""
+    """How the shoe communicates: its decoder, its information if any, the samples so far and their arrival times."""
 
     decoder: Decoder
     first: list[tuple[Samples, Array]] = field(default_factory=list)
@@ -40,11 +40,11 @@ class Greeting:
 
     @property
     def takes_commands(self) -> bool:
-        """Frames have commands, text lines have none."""
+        """Whether the device accepts commands: frames have them, text lines do not."""
         return isinstance(self.decoder, FrameDecoder)
 
     def is_complete(self, now_s: float) -> bool:
-        """Whether samples came, and what they do not say: frames' information, lines' rate; each is waited for."""
+        """Whether samples arrived and what they lack (information for frames, a rate for lines) came or is overdue."""
         if not self.first:
             return False
         waited_s = now_s - float(self.first[0][1][0])
@@ -54,17 +54,17 @@ class Greeting:
         return waited_s > RATING_WAIT_S or float(last.device_time_s[-1] - first.device_time_s[0]) >= RATED_S
 
     def has_other_channels(self, samples: Samples) -> bool:
-        """Whether the device has another number of channels than its decoder was made for."""
+        """Whether the number of channels in ``samples`` differs from the one the decoder was made for."""
         return self.information is not None and len(self.information.channels) != len(samples.names)
 
     @property
     def information(self) -> Information | None:
-        """What the device said of itself."""
+        """The information that the device sent about itself, or None."""
         return self.decoder.information
 
 
 def decoder_for(format_: str, settings: SerialSettings, information: Information | None = None) -> Decoder:
-    """A fresh decoder of "frames" (of the channels that ``information`` names) or "lines"."""
+    """A new decoder of "frames" (with the channels that ``information`` names) or "lines"."""
     if format_ == "frames":
         decoder = FrameDecoder() if information is None else FrameDecoder(information.names)
         decoder.information = information
@@ -73,22 +73,22 @@ def decoder_for(format_: str, settings: SerialSettings, information: Information
 
 
 def hello(settings: SerialSettings) -> bytes:
-    """The commands that wake a shoe: tell of yourself, take this rate, start."""
+    """The commands that wake a shoe: send information, set the rate, start."""
     rate = (Command("rate", settings.rate),) if settings.rate else ()
     return b"".join(encode_command(c) for c in (Command("information"), *rate, Command("start")))
 
 
 def farewell() -> bytes:
-    """The command that lets it rest."""
+    """The command that stops a shoe."""
     return encode_command(Command("stop"))
 
 
 def greet(name: str, port: Port, settings: SerialSettings, clock: Callable[[], float], until_s: float) -> Greeting:
-    """Talk until samples come; raises `DeviceTimeoutError`, with what the bytes look like, at ``until_s`` of ``clock``.
+    """Exchange until samples arrive; raises `DeviceTimeoutError`, describing the bytes, at ``until_s`` of ``clock``.
 
-    Frames are waited for together with the information frame; where samples come without it for `INFORMATION_WAIT_S`,
-    they are taken as counts. Of text lines `RATED_S` are taken, for their rate, within `RATING_WAIT_S`. Once samples
-    have come, ``until_s`` counts no more.
+    Frames are awaited together with the information frame; where it is missing for `INFORMATION_WAIT_S`, readings stay
+    counts. Of text lines `RATED_S` are collected to measure their rate, for `RATING_WAIT_S` at most. Once samples have
+    arrived, ``until_s`` no longer applies.
     """
     begin_s = clock()
     asked_s = begin_s - ASK_AGAIN_S if settings.format == "frames" else begin_s + LISTEN_S - ASK_AGAIN_S

@@ -1,6 +1,6 @@
-"""A serial port that says what is wrong in one sentence: opened exclusively, read in short waits, closed fully.
+"""A serial port with one-sentence errors: opened exclusively, read with short waits, closed fully.
 
-Linux, macOS and Windows; Bluetooth's RFCOMM devices and USB are ports like any other. pyserial raises its own
+Works on Linux, macOS and Windows; Bluetooth's RFCOMM devices and USB are ports like any other. pyserial raises its own
 `SerialException`, plain `OSError` (``in_waiting`` of a port whose peer is gone) and, on POSIX, `termios.error`, which
 is neither: all three become `DeviceError` here.
 """
@@ -20,16 +20,16 @@ WRITE_WAIT_S = 0.5
 
 
 class Port(Protocol):
-    """What `SerialShoe` needs of a port; every method raises `DeviceError` once the peer is gone."""
+    """What `SerialShoe` needs from a port; every method raises `DeviceError` once the peer is gone."""
 
     def read(self, wait_s: float = READ_WAIT_S) -> bytes:
-        """What has come, waiting ``wait_s`` at most for the first byte; empty where nothing came."""
+        """The bytes received, waiting at most ``wait_s`` for the first one; empty where none arrived."""
 
     def write(self, data: bytes) -> None:
         """Send ``data`` within `WRITE_WAIT_S`."""
 
     def close(self) -> None:
-        """Let go of the port; never raises."""
+        """Close the port; never raises."""
 
 
 def _port_errors() -> tuple[type[Exception], ...]:
@@ -68,11 +68,11 @@ class SerialPort:
         return data
 
     def _is_ready(self, wait_s: float) -> bool:
-        """Whether there is something to read, within ``wait_s``; on Windows the reading itself waits."""
+        """Whether there is something to read within ``wait_s``; always true on Windows, where reading itself waits."""
         if sys.platform == "win32":
             self._serial.timeout = wait_s
             return True
-        # pyserial would set up the whole port anew for each other time to wait.
+        # pyserial would reconfigure the whole port for each change of the waiting time.
         return bool(select.select([self._serial.fileno()], [], [], wait_s)[0])
 
     def write(self, data: bytes) -> None:
@@ -87,11 +87,11 @@ class SerialPort:
         try:
             self._serial.close()
         except self._errors:
-            return  # the peer is gone, and with it what there was to close
+            return  # the peer is gone, so nothing is left to close
 
 
 def _short(error: BaseException) -> str:
-    """What the operating system said, without pyserial's repetition of it."""
+    """The operating system's message, without pyserial's repetition of it."""
     number = getattr(error, "errno", None)
     if isinstance(number, int):
         return errno.errorcode.get(number, str(number)) + ": " + _strerror(number)
@@ -105,20 +105,20 @@ def _strerror(number: int) -> str:
 
 
 def _number(error: BaseException) -> int | None:
-    """The error's number, also where pyserial hid it in its text (Windows)."""
+    """The error's errno, including where pyserial only puts it in the text (Windows)."""
     number = getattr(error, "errno", None)
     if isinstance(number, int):
         return number
     text = str(error)
     if "FileNotFoundError" in text:
         return errno.ENOENT
-    if "PermissionError" in text:  # Windows says so where another program holds the port
+    if "PermissionError" in text:  # Windows reports this where another program holds the port
         return errno.EBUSY
     return None
 
 
 def why_not_open(path: str, error: BaseException) -> str:
-    """One sentence on why port ``path`` does not open: what is wrong and what mends it."""
+    """One sentence for the user: why port ``path`` does not open and what would fix it."""
     number = _number(error)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return f"port {path} is not there: {_mend_absent(path)}"
@@ -147,7 +147,7 @@ def _mend_permission(path: str) -> str:
 
 
 def _ports() -> str:
-    """The ports of this machine, for a sentence."""
+    """The serial ports of this computer, as part of a sentence."""
     try:
         from serial.tools.list_ports import comports
 
@@ -160,7 +160,7 @@ def _ports() -> str:
 
 
 def _holder(path: str) -> str:
-    """The process that has the port open, where this user may know (Linux)."""
+    """The process that has the port open, where this user may see it (Linux)."""
     try:
         target = Path(path).resolve()
         for link in Path("/proc").glob("[0-9]*/fd/*"):
@@ -170,7 +170,7 @@ def _holder(path: str) -> str:
                     name = (Path("/proc") / process / "comm").read_text(encoding="utf-8").strip()
                     return f"another program ({name}, process {process})"
             except OSError:
-                continue  # the process has ended, or is not ours to look at
+                continue  # the process has ended, or belongs to another user
     except OSError:
         pass
     return "another program (a terminal, the Arduino monitor, ModemManager)"

@@ -1,4 +1,7 @@
-"""The thread behind a `SerialShoe`: reads the port, watches for valid frames, reopens a lost port; every wait ends."""
+"""The thread behind a `SerialShoe`: reads the port, watches for valid frames, reopens a lost port.
+
+No wait is unbounded.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +21,20 @@ from smartshoe.devices.serial_link.reconnect import Backoff
 from smartshoe.devices.wire.samples import Samples, join_samples
 from smartshoe.errors import DeviceError, DeviceTimeoutError
 
-# Reading waits 50 ms, writing 500 ms; only an operating system that hangs in opening a port takes longer.
+# Reading waits 50 ms, writing 500 ms; only an operating system that hangs while opening a port takes longer.
 JOIN_S = 2.0
 MOST_DOUBLINGS = 3
 PAUSE_SAMPLES = 5.0
-# What comes within this time of a first byte is decoded together: the work is by the call, not by the sample. Each
-# piece is read, and its time taken, as it comes.
+# Bytes that arrive within this time of a first one are decoded together, since the cost is per call, not per sample.
+# Each chunk is still read, and its time noted, as it arrives.
 GATHER_S = 0.016
-ENOUGH_BYTES = 512  # are decoded at once: to read a fast stream bit by bit would cost more than it saves
+ENOUGH_BYTES = 512  # are decoded at once: gathering more of a fast stream would cost more than it saves
 
 
 class SerialReader:
-    """One opening of a port, from the greeting on. ``assembler`` and ``inbox`` are this reader's own.
+    """Reads one opened port, beginning with the greeting. It fills its own ``assembler`` and ``inbox``.
 
-    Every wait has a bound: no valid frame for ``settings.give_up_s``, and the inbox ends with `DeviceTimeoutError`.
+    Every wait is bounded: without a valid frame for ``settings.give_up_s``, the inbox ends with `DeviceTimeoutError`.
     """
 
     def __init__(
@@ -58,25 +61,25 @@ class SerialReader:
         self._opened_s = self._valid_s = clock()
         said = greeting.information
         self._serial_number = None if said is None else said.serial_number
-        self._openings = 0  # since the last valid frame
+        self._openings = 0  # of the port, since the last valid frame
         self._is_silent = self._is_away = False
         self._reason = "silent"
-        # Together: the pace of text lines, by which lost ones are told, is measured over all of them.
+        # In one call: the period of text lines, which reveals lost ones, is measured over all of them.
         parts, arrivals_s = zip(*greeting.first, strict=True)
         self._hand_on(join_samples(parts), np.concatenate(arrivals_s))
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
 
     @property
     def decoder(self) -> Decoder:
-        """What turns this shoe's bytes into samples, with its counters."""
+        """The decoder of this shoe's bytes, with its counters."""
         return self.greeting.decoder
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start the reading thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """End reading and waiting at once; what was not taken is discarded."""
+        """Stop reading and end all waits at once; blocks that were not taken are discarded."""
         self._closing.set()
         self.inbox.end(discard=True)
         self._thread.join(JOIN_S)
@@ -92,7 +95,7 @@ class SerialReader:
             self._say(farewell())
         except DeviceError as failed:
             error = failed
-        except Exception as failed:  # a fault of ours must end the stream, not leave its reader waiting
+        except Exception as failed:  # an error in this thread must end the stream, not leave the consumer waiting
             error = DeviceError(f"{self._name}: reading failed ({type(failed).__name__}: {failed}); please report this")
             error.__cause__ = failed
         finally:
@@ -116,7 +119,7 @@ class SerialReader:
             raise _LostError(str(lost)) from lost
 
     def _gathered(self, port: Port) -> tuple[bytes, DeviceError | None]:
-        """What came within `GATHER_S`, or `ENOUGH_BYTES` of it, and the error that ended the port meanwhile."""
+        """The bytes received within `GATHER_S` (or `ENOUGH_BYTES`) and the error that ended the port, if any."""
         pieces: list[bytes] = []
         wait_s, until_s, size = READ_WAIT_S, 0.0, 0
         while wait_s > 0.0 and size < ENOUGH_BYTES and not self._closing.is_set():
@@ -161,24 +164,24 @@ class SerialReader:
         self._backoff.reset()
 
     def _watch(self, now_s: float) -> None:
-        """Silence becomes an event, then a new start command, then a new opening of the port, then an error."""
+        """React to silence: first an event, then a new start command, then reopening the port, finally an error."""
         silent_s = now_s - self._valid_s
         if silent_s > max(self._settings.silence_s, self._pause_s()) and not self._is_silent:
             self._is_silent = True
             self.log.add(Silence(now_s, silent_s))
-            # It may have booted anew and wait to be started.
+            # The device may have rebooted and wait for the start command.
             self._say(hello(self._settings))
         self._give_up_in_time(now_s, "silent, though its port is open")
         if now_s - max(self._valid_s, self._opened_s) > self._patience_s():
             raise _LostError(f"no valid frame for {silent_s:.1f} s")
 
     def _pause_s(self) -> float:
-        """What is no silence yet of a shoe that sends seldom."""
+        """Longest pause in s that is not yet silence, for a shoe that sends rarely."""
         rate_hz = self.assembler.rate_hz
         return 0.0 if rate_hz is None else PAUSE_SAMPLES / rate_hz
 
     def _patience_s(self) -> float:
-        """How long an open port may be silent: longer each time, as Bluetooth may take seconds to connect behind it."""
+        """How long in s an open port may be silent; longer each time, since Bluetooth may take seconds to connect."""
         return max(self._settings.reopen_s * 2.0 ** min(self._openings, MOST_DOUBLINGS), self._pause_s())
 
     def _give_up_in_time(self, now_s: float, reason: str) -> None:
@@ -189,7 +192,10 @@ class SerialReader:
             )
 
     def _recover(self, reason: str) -> None:
-        """Close fully, open again; returns with an open port or when closing, raises at the bound."""
+        """Close the port fully and reopen it.
+
+        Returns when it is open or the reader is closing; raises `DeviceTimeoutError` at the time limit.
+        """
         self._let_go()
         if not self._is_away:
             self._is_away = True
@@ -213,7 +219,7 @@ class SerialReader:
         try:
             self._port.write(command)
         except DeviceError:
-            return  # a port that takes no bytes shows at the next read or as silence; both are acted on
+            return  # the next read, or the silence that follows, reveals a port that takes no bytes; both are handled
 
     def _let_go(self) -> None:
         port, self._port = self._port, None
@@ -222,4 +228,4 @@ class SerialReader:
 
 
 class _LostError(Exception):
-    """The connection is gone or useless: recover."""
+    """The connection is lost or useless and must be re-established."""

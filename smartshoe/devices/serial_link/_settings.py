@@ -1,4 +1,4 @@
-"""What a ``serial:`` address may say after its question mark, checked."""
+"""The options of a ``serial:`` address, checked."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ Format = Literal["auto", "frames", "lines"]
 TimeUnit = Literal["auto", "s", "ms", "us"]
 Side = Literal["", "left", "right"]
 
-# Half a turn of the device's 32-bit microsecond counter (71.6 min): a longer silence could not be told from none.
+# Half a turn of the device's 32-bit microsecond counter (71.6 min): its time would be ambiguous after a longer silence.
 LONGEST_SILENCE_S = 2100.0
 
 
 @dataclass(frozen=True, slots=True)
 class SerialSettings:
-    """How a shoe at a serial port talks, and how long its silence is borne.
+    """How a shoe at a serial port communicates, and how long its silence is tolerated.
 
-    ``columns`` and ``time`` are those of text lines; ``unit`` is the readings' (text lines) or the one to convert
-    to (frames), empty for the device's own; ``rate`` in Hz is asked of the device where it takes commands, and is
-    what is expected before it has said so itself; 0 leaves it. ``wait_s`` is how long the first valid frame may
-    take, ``silence_s`` when silence becomes an event, ``reopen_s`` when a silent port is closed and opened again
-    (twice as long after each such attempt, to eight times), ``give_up_s`` when the stream ends with an error.
-    ``buffer`` is how many samples wait for a reader.
+    ``columns`` and ``time`` describe text lines; ``unit`` is that of the readings (text lines) or the one to convert to
+    (frames), empty for the device's own. ``rate`` in Hz is requested from a device that takes commands, and is assumed
+    until the device states its own; 0 leaves it unchanged. ``wait_s`` is how long the first valid frame may take,
+    ``silence_s`` when silence becomes an event, ``reopen_s`` when a silent port is closed and reopened (doubled after
+    each attempt, up to eight times), ``give_up_s`` when the stream ends with an error. ``buffer`` is how many unread
+    samples are stored.
     """
 
     baud: int = 115200
@@ -94,7 +94,7 @@ _OPTIONS: dict[str, tuple[Callable[[Any], Any], str]] = {
 
 
 def settings_from(target: str, options: Mapping[str, Any]) -> SerialSettings:
-    """Settings from an address's options; raises `UsageError` on the first that is unknown or out of bounds."""
+    """Settings from an address's options; raises `UsageError` for the first one that is unknown or out of bounds."""
     checked: dict[str, Any] = {}
     for key, value in options.items():
         if key not in _OPTIONS:

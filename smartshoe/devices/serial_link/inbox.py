@@ -1,4 +1,4 @@
-"""Blocks between the thread that reads a port and who iterates over them: bounded in number; every wait ends."""
+"""A bounded queue of blocks between the thread that reads a port and the consumer; no wait is unbounded."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from smartshoe.errors import DeviceError
 
 
 class Inbox:
-    """A queue of blocks that holds ``limit`` samples; the oldest go when it is full, and are counted.
+    """A queue of blocks that holds ``limit`` samples; when it is full the oldest are dropped and counted.
 
-    ``end`` closes it: what waits is still given out, then `take` returns None, or raises the error given.
+    ``end`` closes it: blocks already queued are still given out, then `take` returns None or raises the given error.
     """
 
     def __init__(self, limit: int) -> None:
@@ -30,7 +30,7 @@ class Inbox:
         self._changed = Condition()
 
     def put(self, block: Block) -> None:
-        """Add ``block``; makes room by dropping the oldest."""
+        """Add ``block``, dropping the oldest blocks where there is no room."""
         with self._changed:
             if self._ended or not len(block):
                 return
@@ -46,7 +46,7 @@ class Inbox:
         self._dropped = (count + len(block), start, float(block.time_s[-1]))
 
     def end(self, error: DeviceError | None = None, discard: bool = False) -> None:
-        """No more blocks come; ``discard`` throws away those that wait. The first call counts."""
+        """Close the queue; ``discard`` drops the blocks still in it. Only the first call has an effect."""
         with self._changed:
             if discard:
                 self._blocks.clear()
@@ -58,13 +58,16 @@ class Inbox:
             self._changed.notify_all()
 
     def take_dropped(self) -> tuple[int, float, float] | None:
-        """How many samples were dropped since the last call, and their first and last time; None where none were."""
+        """Number of samples dropped since the last call, with their first and last time; None where none were."""
         with self._changed:
             dropped, self._dropped = self._dropped, None
             return dropped
 
     def take(self, wait_s: float) -> tuple[Block, ...] | None:
-        """All that waits, within ``wait_s``; empty where nothing came; None once the inbox has ended."""
+        """All queued blocks, waiting at most ``wait_s`` for one.
+
+        Empty where none arrived, None once the queue has ended.
+        """
         with self._changed:
             self._changed.wait_for(lambda: bool(self._blocks) or self._ended, wait_s)
             if self._blocks:
@@ -80,7 +83,7 @@ class Inbox:
 
 
 def joined(blocks: Sequence[Block]) -> Block:
-    """Consecutive blocks of one stream as one."""
+    """Consecutive blocks of one stream merged into one."""
     if len(blocks) == 1:
         return blocks[0]
     return replace(

@@ -1,4 +1,4 @@
-"""How long to wait before a lost port is tried again."""
+"""The waiting time between attempts to reopen a lost port."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Backoff:
-    """Waits that double from ``first_s`` to ``longest_s``; a success starts them over."""
+    """Waiting times that double from ``first_s`` up to ``longest_s``; `reset` starts over."""
 
     first_s: float = 0.1
     longest_s: float = 2.0
     attempts: int = 0
 
     def next_wait_s(self) -> float:
-        """The wait before the next attempt, which is counted."""
+        """The waiting time in s before the next attempt, which this call counts."""
         # The exponent is bounded: a power of two beyond any float would raise.
         wait_s = min(self.first_s * 2.0 ** min(self.attempts, 60), self.longest_s)
         self.attempts += 1
         return wait_s
 
     def reset(self) -> None:
-        """After a success."""
+        """Start again from ``first_s``, after a successful attempt."""
         self.attempts = 0

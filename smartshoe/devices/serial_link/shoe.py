@@ -33,11 +33,11 @@ SIDES = ("left", "right")
 class SerialShoe(Shoe):
     """The shoe at port ``target`` (``/dev/rfcomm0``, ``/dev/ttyUSB0``, ``COM5``).
 
-    A thread reads while the shoe is open. `blocks` yields all that came since the last block, each sample once, in
-    order, on the device's own clock; an empty block each half second of silence. A lost connection is taken up
-    again and shows in `events`; only ``give_up_s`` without one valid frame ends `blocks`, with
-    `DeviceTimeoutError`. `close`, from any thread, ends it at once. Samples that nobody takes wait in a bounded
-    buffer; the oldest go first, with an event.
+    A thread reads while the shoe is open. `blocks` yields everything received since the last block, each sample once,
+    in order, on the device's own clock, and an empty block for each half second of silence. A lost connection is
+    re-established and reported in `events`; only ``give_up_s`` without one valid frame ends `blocks`, with
+    `DeviceTimeoutError`. `close`, from any thread, ends it at once. Unread samples wait in a bounded buffer; the oldest
+    are dropped first, with an event.
     """
 
     def __init__(
@@ -60,12 +60,12 @@ class SerialShoe(Shoe):
 
     @property
     def information(self) -> Information | None:
-        """What the device said of itself when it was last opened; None before, and from text lines."""
+        """What the device reported about itself when last opened; None before that, and for text lines."""
         return None if self._reader is None else self._reader.greeting.information
 
     @property
     def counters(self) -> Counters | None:
-        """Frames seen, spoiled, lost and so on since the last opening; None before."""
+        """Counts of frames seen, damaged, lost and so on since the last opening; None before."""
         return None if self._reader is None else self._reader.decoder.counters
 
     @property
@@ -75,7 +75,7 @@ class SerialShoe(Shoe):
 
     @property
     def events(self) -> tuple[ShoeEvent, ...]:
-        """What befell the stream since it was last opened, oldest first."""
+        """Events of the stream since it was last opened, oldest first."""
         if self._reader is None:
             return ()
         self._note_drops(self._reader)
@@ -83,7 +83,7 @@ class SerialShoe(Shoe):
 
     @property
     def sample_rate_hz(self) -> float:
-        """The device's word, else what its time steps say, else the rate asked for, else 200 Hz."""
+        """The rate that the device states, else the one its time steps show, else the one asked for, else 200 Hz."""
         said = self.information
         if said is not None and said.rate_hz > 0:
             return float(said.rate_hz)
@@ -92,7 +92,7 @@ class SerialShoe(Shoe):
         return self.settings.rate or EXPECTED_RATE_HZ
 
     def describe(self) -> tuple[ChannelDescription, ...]:
-        """The device's channels; before the first opening what the address says."""
+        """The device's channels; before the first opening those that the address states."""
         if self._reader is None:
             columns = _columns_of(self.settings) if self.settings.format == "lines" else REGIONS
             unit = find_unit(self.settings.unit) or MILLIBAR
@@ -101,7 +101,7 @@ class SerialShoe(Shoe):
                 for name in columns
             )
         assembler = self._reader.assembler
-        # Text lines know their unit, not their range.
+        # Text lines state their unit, but not their range.
         said = self.information if self._reader.greeting.takes_commands else None
         described = []
         for column, name in enumerate(assembler.names):
@@ -150,7 +150,7 @@ class SerialShoe(Shoe):
         self._reader.start()
 
     def _greeted(self, port: Port, until_s: float) -> tuple[Port, Greeting]:
-        """A port and the shoe's greeting over it; where the connection breaks it is made anew, until ``until_s``."""
+        """A port and the shoe's greeting over it; a broken connection is re-established until ``until_s``."""
         from smartshoe.devices.serial_link._greeting import greet
 
         backoff = Backoff()
@@ -205,12 +205,12 @@ class SerialShoe(Shoe):
 
 
 def _in_a_thread(work: Callable[[], None]) -> None:
-    """Do ``work`` while the port is read on."""
+    """Run ``work`` in a thread, so that the port continues to be read."""
     threading.Thread(target=work, name="law of delays", daemon=True).start()
 
 
 def _columns_of(settings: SerialSettings) -> tuple[str, ...]:
-    """The units among the columns of text lines; raises `UsageError` where no column is the time."""
+    """The units among the columns of text lines; raises `UsageError` where none of the columns is the time."""
     from smartshoe.devices.serial_link._greeting import decoder_for
 
     return decoder_for("lines", settings).feed(b"").names
@@ -229,17 +229,17 @@ def _empty(reader: SerialReader) -> Block:
 
 
 class _SerialProvider:
-    """``serial:///dev/rfcomm0?baud=115200&format=auto&side=left``; see `SerialSettings` for the options."""
+    """Provider of ``serial:///dev/rfcomm0?baud=115200&format=auto&side=left``; see `SerialSettings` for the options."""
 
     def open_shoe(
         self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
     ) -> SerialShoe:
-        """The shoe at port ``target``, closed; ``rng`` is not used."""
+        """The shoe at port ``target``, not yet opened; ``rng`` is not used."""
         if not target:
             raise UsageError("serial: has no port: write it like serial:///dev/rfcomm0 or serial://COM5")
         settings = settings_from(target, options or {})
         if settings.format != "frames":
-            _columns_of(settings)  # raises
+            _columns_of(settings)  # raises where no column is the time
         return SerialShoe(target, settings)
 
 

@@ -1,1 +1,1 @@
-"""What a shoe sends and is sent, as decoders and encoders without any input or output: see docs/wire.md."""
+"""Decoders and encoders of what a shoe sends and receives, without any input or output; specified in docs/wire.md."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 
-FEW = 2000  # frames up to which one look-up of all their bytes stays in the cache, and is faster
+FEW = 2000  # frames: up to so many, one look-up of all their bytes fits the cache and is faster
 
 
 def checksum(data: bytes) -> int:
@@ -20,7 +20,7 @@ def checksum(data: bytes) -> int:
 
 @cache
 def _tables(length: int) -> tuple[int, NDArray[np.uint16]]:
-    """The checksum of ``length`` zero bytes, and what each value (256) of each byte (length) adds to it."""
+    """The checksum of ``length`` zero bytes, and the contribution (length, 256) of each value of each byte to it."""
     base = checksum(bytes(length))
     tables = np.empty((length, 256), dtype=np.uint16)
     for position in range(length):
@@ -32,7 +32,7 @@ def _tables(length: int) -> tuple[int, NDArray[np.uint16]]:
 
 
 def checksums(columns: Bytes) -> NDArray[np.uint16]:
-    """Checksums (n,) of the frames whose bytes are ``columns`` (length, n): each byte adds its own."""
+    """Checksums (n,) of the frames whose bytes are ``columns`` (length, n), as XOR of each byte's contribution."""
     base, tables = _tables(len(columns))
     if columns.shape[1] < FEW:
         places = 256 * np.arange(len(columns), dtype=np.intp)[:, None]

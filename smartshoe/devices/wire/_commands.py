@@ -1,4 +1,4 @@
-"""What the host asks of a device: start, stop, another rate, its information."""
+"""Commands from the host to a device: start, stop, set the rate, send information."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from smartshoe.errors import UsageError
 CommandKind = Literal["start", "stop", "rate", "information"]
 _TYPES: dict[CommandKind, int] = {"start": 0x81, "stop": 0x82, "rate": 0x83, "information": 0x84}
 _KINDS = {number: kind for kind, number in _TYPES.items()}
-_LONGEST = 8  # encoded
+_LONGEST = 8  # bytes of an encoded command
 MOST_MILLIHERTZ = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command; ``rate_hz`` belongs to kind "rate" alone and is sent in whole millihertz."""
+    """A command; ``rate_hz`` is used by kind "rate" only and sent in whole millihertz."""
 
     kind: CommandKind
     rate_hz: float | None = None
@@ -32,7 +32,7 @@ class Command:
 
 
 def encode_command(command: Command) -> bytes:
-    """The command's frame, with a zero before it: whatever half a frame the device has taken ends there."""
+    """The command's frame, preceded by a zero, which ends any partial frame that the device has received."""
     payload = bytes([_TYPES[command.kind]])
     if command.rate_hz is not None:
         payload += round(command.rate_hz * 1000.0).to_bytes(4, "little")
@@ -40,13 +40,13 @@ def encode_command(command: Command) -> bytes:
 
 
 class CommandDecoder:
-    """The device's side: finds commands in any chunks of bytes, and leaves out what is none."""
+    """The device's side: finds commands in chunks of bytes and skips everything else."""
 
     def __init__(self) -> None:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[Command]:
-        """The commands that end in ``data``."""
+        """The commands that are completed by ``data``."""
         *gaps, rest = (self._rest + data).split(b"\0")
         self._rest = rest[-_LONGEST - 1 :]
         return [command for gap in gaps if gap and (command := _command_of(gap)) is not None]

@@ -1,4 +1,4 @@
-"""The times of text lines: their unit told from their steps, counters unwrapped, what contradicts held back."""
+"""The times of text lines: their unit inferred from their steps, counters unwrapped, inconsistent lines held back."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from smartshoe.devices.wire.counters import Counters
 TimeUnit = Literal["s", "ms", "us"]
 SECONDS: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 COUNTER_TURN = 2.0**32  # of millis() and micros()
-LOOKED_AT = 5  # steps that tell the unit
-GAP_PERIODS = 256.0  # beyond, a line waits for the next one
+LOOKED_AT = 5  # steps from which the unit is inferred
+GAP_PERIODS = 256.0  # after a longer step, a line waits for confirmation by the next one
 MOST_UNEVEN = 2.0
 REMEMBERED = 64
 
@@ -23,7 +23,8 @@ REMEMBERED = 64
 class ReadingLine:
     """A line's ``time`` (as written, or in s once placed) and readings (channels,), NaN where there is none.
 
-    ``end`` is how many bytes of the stream had come when the line was whole; a line sent twice is the same line.
+    ``end`` is the number of bytes of the stream up to the end of this line; it does not count for equality, since a
+    line may be sent twice.
     """
 
     time: float
@@ -33,10 +34,10 @@ class ReadingLine:
 
 
 class LineClock:
-    """Lines in order of time, none twice. A line that leaps in time waits for the next, which must go on from it.
+    """Puts lines in order of time and drops repetitions. A line that jumps in time must be confirmed by the next one.
 
-    ``unit`` None is told from the first `LOOKED_AT` steps; until then lines wait. Whole-numbered counters of 32 bits
-    are unwrapped; a device that restarts begins a new ``boot``.
+    A ``unit`` of None is inferred from the first `LOOKED_AT` steps; lines wait until then. 32-bit integer counters are
+    unwrapped; a device that restarts begins a new ``boot``.
     """
 
     def __init__(self, counters: Counters, unit: TimeUnit | None) -> None:
@@ -52,11 +53,11 @@ class LineClock:
         self._recent: deque[ReadingLine] = deque(maxlen=REMEMBERED)
 
     def use(self, unit: TimeUnit) -> None:
-        """Take times as ``unit`` from the next line on."""
+        """Interpret times in ``unit`` from the next line on."""
         self._unit = unit
 
     def place(self, line: ReadingLine) -> list[ReadingLine]:
-        """The lines that became sure with ``line``, in order, their times in s."""
+        """The lines that ``line`` confirms, in order, with their times in s."""
         self._waiting.append(line)
         if self._unit is None:
             if len(self._waiting) <= LOOKED_AT:
@@ -68,13 +69,13 @@ class LineClock:
         return placed
 
     def _step(self, before: ReadingLine, line: ReadingLine) -> float:
-        """Time from ``before`` to ``line`` as written, over the turn of a counter."""
+        """Time from ``before`` to ``line`` in the unit as written, allowing for one counter overflow."""
         step = line.time - before.time
         is_counter = self._unit != "s" and line.time == int(line.time) and before.time == int(before.time)
         return step + COUNTER_TURN if is_counter and step < -COUNTER_TURN / 2 else step
 
     def _goes_on(self, before: ReadingLine, line: ReadingLine) -> bool:
-        """Whether ``line`` is one of the next few after ``before``."""
+        """Whether ``line`` is one of the next few lines after ``before``."""
         return 0.0 < self._step(before, line) <= GAP_PERIODS * self._period
 
     def _place(self, line: ReadingLine) -> list[ReadingLine]:
@@ -105,7 +106,7 @@ class LineClock:
         return [first, self._give(line)]
 
     def _start(self, line: ReadingLine) -> list[ReadingLine]:
-        """The first three lines in even steps; a first line may be the end of one, with digits of its time missing."""
+        """The first three lines in even steps; the stream may begin within a line, whose time then lacks digits."""
         self._first.append(line)
         if len(self._first) < 3:
             return []
@@ -122,7 +123,7 @@ class LineClock:
             step = self._step(self._last, line)
             if line.time < self._last.time:
                 self._turns += COUNTER_TURN
-            # Slowly, and never by more than a quarter: lost lines make long steps, and stay exceptions.
+            # Adapt slowly, by a quarter at most: lost lines make long steps, which must remain exceptions.
             self._period += max(min(step - self._period, self._period), -self._period) / 4.0
         self._last = line
         self._recent.append(line)
@@ -131,9 +132,9 @@ class LineClock:
 
 
 def told_unit(times: list[float]) -> TimeUnit:
-    """The unit of ``times`` as written, from their steps: shoes send 1 to 1000 samples a second.
+    """The unit of ``times`` as written, inferred from their steps; shoes send 1 to 1000 samples per second.
 
-    Fractions are seconds. Whole numbers are microseconds in steps from 1000, else milliseconds.
+    Fractions are seconds. Whole numbers are microseconds in steps from 1000 on, else milliseconds.
     """
     if any(time != int(time) for time in times):
         steps = [abs(b - a) for a, b in pairwise(times)]

@@ -1,8 +1,8 @@
-"""Frames in their place: the 16-bit count and the 32-bit clock unwrapped, duplicates out, what contradicts held back.
+"""Orders frames: unwraps the 16-bit count and 32-bit clock, drops duplicates, holds back inconsistent frames.
 
-A frame is *near* the last one where at most `NEAR` samples are missing between them and its time is where the count
-puts it; near frames pass at once. Any other waits for the next frame: it is given out where that one carries it on
-(a longer gap, another rate, a device that restarted), dropped where the next one carries on the line before it.
+A frame is *near* the last one where at most `NEAR` samples are missing between them and its time agrees with its count;
+near frames pass at once. Any other frame waits for the next one. It is given out if that one continues it (after a
+longer gap, at another rate, or from a restarted device), and dropped if the next one continues the frames before it.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from smartshoe.arrays import Integers
 from smartshoe.devices.wire.counters import Counters
 
 NEAR = 200
-REMEMBERED = 64  # frames within which a late one is recognised
+REMEMBERED = 64  # last frames, among which a late one is recognised
 WINDOW = 1024  # frames over which the period is averaged
 COUNT, CLOCK = 0xFFFF, 0xFFFFFFFF
 HALF_TURN = 1 << 15
 LONGEST_GAP_US = 1 << 31  # half a turn of the clock: 35.8 min
-JITTER = 0.5  # of a period: how far a frame's time may be off
-CRYSTAL = 0.002  # how far a period, once averaged, may be off; NEAR samples then are less than one off
-SHORTEST_US, LONGEST_US = 20.0, 5e6  # a period, before one is known
+JITTER = 0.5  # of a period: largest error of a frame's time
+CRYSTAL = 0.002  # largest relative error of the averaged period: less than one sample over NEAR of them
+SHORTEST_US, LONGEST_US = 20.0, 5e6  # bounds of a period before one is known
 MOST_DOUBTS = 8
 
-_Frame = tuple[int, int]  # count and clock as sent
+_Frame = tuple[int, int]  # count and clock (us) as sent
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Which rows are given out, in order: row 0 is the one that was held before, row k the k-th of those handed in.
+    """The rows to give out, in order: row 0 is the frame held back before, row k the k-th frame of this call.
 
-    ``sequence``, ``time_us`` and ``boot`` (n,) belong to them; ``held`` is the row that waits now, or None.
+    ``sequence``, ``time_us`` and ``boot`` (n,) belong to these rows; ``held`` is the row held back now, or None.
     """
 
     rows: Integers
@@ -43,7 +43,7 @@ class Placed:
 
 
 class Ordering:
-    """The state of one stream; counts what it keeps back in ``counters``."""
+    """The state of one stream; frames that are not given out are counted in ``counters``."""
 
     def __init__(self, counters: Counters) -> None:
         self._counters = counters
@@ -60,10 +60,10 @@ class Ordering:
         self._recent = np.full(REMEMBERED, -1, dtype=np.int64)
 
     def place(self, counts: Integers, clocks: Integers) -> Placed:
-        """Place frames of ``counts`` and ``clocks`` (n,), as sent and in order of arrival."""
+        """Order frames with ``counts`` and ``clocks`` (n,), as sent and in order of arrival."""
         return _Placing(self, counts, clocks).run()
 
-    # What follows decides; `_Placing` carries it over a whole block.
+    # The methods below decide about single frames; `_Placing` applies them to a whole block.
 
     def _near(self, before: _Frame, frame: _Frame) -> bool:
         if self._period_us is None:
@@ -75,14 +75,14 @@ class Ordering:
         return (JITTER + CRYSTAL * steps) * (self._period_us or 0.0)
 
     def _is_late(self, frame: _Frame, came: _Frame | None) -> bool:
-        """Whether ``frame`` was sent a little before the one that ``came``, by count and clock alike."""
+        """Whether ``frame`` was sent shortly before the frame ``came``, by both count and clock."""
         if came is None or self._period_us is None:
             return False
         behind, earlier = (came[0] - frame[0]) & COUNT, (came[1] - frame[1]) & CLOCK
         return 1 <= behind <= REMEMBERED and abs(earlier - behind * self._period_us) <= self._tolerance_us(behind)
 
     def _steps(self, before: _Frame, frame: _Frame) -> int | None:
-        """Samples from ``before`` to ``frame`` where clock and count agree on them, whatever was lost; else None."""
+        """Number of samples from ``before`` to ``frame`` where clock and count agree, even over losses; else None."""
         ahead, later = (frame[0] - before[0]) & COUNT, (frame[1] - before[1]) & CLOCK
         if self._period_us is None or later >= LONGEST_GAP_US:
             return None
@@ -93,7 +93,10 @@ class Ordering:
         return steps
 
     def _agreement(self, held: _Frame, frame: _Frame) -> str:
-        """How ``frame`` carries on ``held``: "next", "strays" (soon, at another pace), "far" (a long gap); else ""."""
+        """How ``frame`` continues ``held``: "next", "strays" (soon, at another rate), "far" (after a long gap).
+
+        Else "".
+        """
         if self._near(held, frame):
             return "next"
         ahead, later = (frame[0] - held[0]) & COUNT, (frame[1] - held[1]) & CLOCK
@@ -105,7 +108,7 @@ class Ordering:
         return "far" if self._steps(held, frame) else ""
 
     def _gap_to(self, frame: _Frame) -> int | None:
-        """Samples from the last one to ``frame`` where the device ran on, None where it restarted."""
+        """Number of samples from the last frame to ``frame`` where the device kept running, None where it restarted."""
         if self._last is None or self._period_us is None:
             return None
         steps = self._steps(self._last, frame)
@@ -129,9 +132,9 @@ class Ordering:
         return steps
 
     def _doubt_period(self, before: _Frame, frame: _Frame) -> bool:
-        """Two frames of another pace were given out; whether that made the period change.
+        """Note that two frames at another rate were given out; returns whether this changed the period.
 
-        One may be stamped late, which the period does not follow; many together are another rate.
+        A single one may be stamped late, which the period ignores; several in a row mean another rate.
         """
         self._doubts += 2
         if self._period_us is not None and self._doubts < MOST_DOUBTS:
@@ -146,7 +149,7 @@ class Ordering:
         self._since_anchor, self._renew_after = 0, renew_after
 
     def _count(self, frames: int) -> bool:
-        """``frames`` more were given out; whether the period changed by it."""
+        """Count ``frames`` more as given out; returns whether this changed the period."""
         self._since_anchor += frames
         if self._since_anchor < self._renew_after:
             return False
@@ -160,9 +163,9 @@ class Ordering:
 
 
 class _Placing:
-    """One block of frames on its way through an `Ordering`.
+    """One block of frames being put through an `Ordering`.
 
-    Rows 0 and 1 stand for the frame held and the last one given out; the block begins at row 2.
+    Row 0 is the frame held back, row 1 the last one given out; the block begins at row 2.
     """
 
     def __init__(self, state: Ordering, counts: Integers, clocks: Integers) -> None:
@@ -189,7 +192,7 @@ class _Placing:
         return Placed(np.maximum(rows - 1, 0), sequence, time_us, boot, held)
 
     def _run_slice(self, start: int, stop: int) -> int:
-        """Place rows until ``stop``, or until the period has changed; the next row to place."""
+        """Place rows up to ``stop``, or until the period changes; returns the next row to place."""
         state = self._state
         period = state._period_us
         if period is None:
@@ -218,7 +221,7 @@ class _Placing:
         return row
 
     def _give_run(self, start: int, stop: int, ahead: Integers, later: Integers) -> bool:
-        """Give out rows that are each near the one before."""
+        """Give out rows that are each near the one before; returns whether the period changed."""
         state, size = self._state, stop - start
         here = slice(self._size, self._size + size)
         self._out[0, here] = np.arange(start, stop)
@@ -238,7 +241,7 @@ class _Placing:
         return int(self._counts[row]), int(self._clocks[row])
 
     def _step(self, row: int) -> bool:
-        """Place one row by what is known and what waits; whether the period changed."""
+        """Place one row by the known period and the frame held back; returns whether the period changed."""
         state, counters = self._state, self._state._counters
         frame, held = self._frame(row), state._held
         if state._last is not None and state._near(state._last, frame):
@@ -259,13 +262,16 @@ class _Placing:
         return self._give_held(held, self._held_row, row, agreement)
 
     def _settle_before(self, frame: _Frame) -> bool:
-        """Give out the row that waits if it stands between the last one and ``frame``, else drop it."""
+        """Give out the held row if it lies between the last one and ``frame``, else drop it.
+
+        Returns whether the period changed.
+        """
         state, held, row = self._state, self._state._held, self._held_row
         if held is None or row is None or state._last is None:
             return False
         self._hold(None)
         ahead, later = (held[0] - state._last[0]) & COUNT, (held[1] - state._last[1]) & CLOCK
-        # Where samples are stamped unevenly, a frame may be far off its place between two that are not.
+        # Where samples are stamped unevenly, a frame may be far off its expected time between two that are not.
         if 0 < ahead < (frame[0] - state._last[0]) & COUNT and 0 < later < (frame[1] - state._last[1]) & CLOCK:
             return self._give(row, ahead)
         state._counters.implausible += 1
@@ -295,14 +301,14 @@ class _Placing:
         return self._give(row, ahead) or changed
 
     def _give_first(self, frame: _Frame, row: int) -> None:
-        """Give out a device's first frame after it booted."""
+        """Give out the first frame of a device after it booted."""
         state = self._state
         state._sequence, state._time_us = frame
         state._measure_from_here(16)
         self._write(row)
 
     def _give(self, row: int, ahead: int) -> bool:
-        """Give out ``row``, ``ahead`` samples after the last one; whether the period changed."""
+        """Give out ``row``, ``ahead`` samples after the last one; returns whether the period changed."""
         state, frame = self._state, self._frame(row)
         if state._last is not None:
             state._time_us += (frame[1] - state._last[1]) & CLOCK

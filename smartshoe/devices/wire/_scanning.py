@@ -1,7 +1,7 @@
-"""Bytes cut at their zeros into frames that were whole: COBS undone, checksums checked, garbage counted.
+"""Splits bytes at their zeros into complete frames: undoes COBS, verifies checksums, counts garbage.
 
-Only a frame's own bytes decide on it: what stands in the same gap between two zeros before a whole frame (garbage, or
-a frame whose end was lost) is cut off, so that a bad frame never takes the good one behind it along.
+Only a frame's own bytes decide about it: anything between two zeros that precedes a complete frame (garbage, or a frame
+whose end was lost) is cut off, so that a bad frame never destroys the good one behind it.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from smartshoe.devices.wire.information import LONGEST_TEXT, Information
 from smartshoe.errors import FormatError
 
 SAMPLE, INFORMATION = 0x01, 0x02
-LONGEST_ENCODED = LONGEST_TEXT + 8  # type, checksum, and COBS's byte for each 254
+LONGEST_ENCODED = LONGEST_TEXT + 8  # plus type, checksum, and one byte of COBS for each 254
 _INFORMATION_BEGINS = bytes([INFORMATION]) + b"protocol="
 _PRINTABLE = frozenset(range(0x20, 0x7F))
 
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """``payloads`` (length, n): the bytes of n sample frames, type first, checksum last; ``information`` the newest.
+    """``payloads`` (length, n): n sample frames, type first, checksum last; ``information``: the newest, if any.
 
-    ``end`` (n,) is how many bytes of the stream had come when each frame was whole.
+    ``end`` (n,) is the number of bytes of the stream up to the end of each frame.
     """
 
     payloads: Bytes
@@ -40,19 +40,19 @@ class FrameScanner:
     """Finds sample frames of ``payload_length`` bytes (type to checksum) and information frames in any chunks."""
 
     def __init__(self, payload_length: int, counters: Counters) -> None:
-        self._length = payload_length + 1  # as encoded, without the zero
+        self._length = payload_length + 1  # bytes once encoded, without the final zero
         self._counters = counters
         self._rest = b""
         self._is_cut = False
         self._is_lost = False
 
     def reset(self) -> None:
-        """Forget the frame that has only begun; the next whole frame counts as found again where it had not ended."""
+        """Discard the partial frame, if any; the next complete frame then counts as a resynchronisation."""
         self._is_lost |= bool(self._rest)
         self._rest, self._is_cut = b"", False
 
     def feed(self, data: bytes) -> Scanned:
-        """The whole frames that end in ``data``."""
+        """The frames that are completed by ``data``."""
         self._counters.bytes += len(data)
         data = self._rest + data
         if 0 not in data:
@@ -65,14 +65,14 @@ class FrameScanner:
         self._rest = rest[-LONGEST_ENCODED:]
         starts = np.concatenate([[0], ends[:-1] + 1])
         lengths = ends - starts
-        # What the last calls threw away of the first gap still stood before it.
+        # Bytes of the first gap that earlier calls discarded still count as garbage before its frame.
         lengths[0] += LONGEST_ENCODED if self._is_cut else 0
         self._is_cut = len(rest) > LONGEST_ENCODED
         there = lengths > 0
         return self._sort(data, buffer, ends[there], lengths[there])
 
     def _sort(self, data: bytes, buffer: Bytes, ends: Index, lengths: Index) -> Scanned:
-        """Tell the gaps between zeros apart: sample frames, information frames, garbage."""
+        """Classify the gaps between zeros as sample frames, information frames or garbage."""
         may_be = np.flatnonzero(lengths >= self._length)
         payloads, is_whole = self._decode(buffer, ends[may_be])
         is_good = np.zeros(ends.size, dtype=bool)
@@ -102,8 +102,8 @@ class FrameScanner:
         if not ends.size:
             return np.zeros((length - 1, 0), dtype=np.uint8), np.zeros(0, dtype=bool)
         columns = buffer.take(ends - np.arange(length, 0, -1)[:, None])
-        # ``code`` is where the next zero was taken out. A sum beyond 255 wraps to a place already passed, which is
-        # met no more.
+        # ``code`` is where the next zero was removed. A sum beyond 255 wraps to a place already passed, which is
+        # not visited again.
         code = columns[0].copy()
         is_code = np.empty((length - 1, ends.size), dtype=bool)
         step = np.empty_like(code)
@@ -118,10 +118,10 @@ class FrameScanner:
         return payload, is_whole
 
     def _find_information(self, gap: bytes) -> tuple[Information | None, int]:
-        """The information frame that ends ``gap`` and where it begins there."""
+        """The information frame at the end of ``gap`` (or None), and the position in ``gap`` where it begins."""
         begins = gap.rfind(_INFORMATION_BEGINS) - 1
         payload = unframed(gap[begins:]) if begins >= 0 else None
-        # Codes that a flipped bit moved leave a zero or a code between the letters: no letter is either.
+        # A flipped bit in a COBS code leaves a zero or a code among the text's characters, which have neither value.
         if payload is None or not is_intact(payload) or not _PRINTABLE.issuperset(payload[1:-2]):
             return None, 0
         try:
@@ -130,7 +130,7 @@ class FrameScanner:
             return None, 0
 
     def _blame(self, gap: bytes, length: int) -> None:
-        """Count what is wrong with a gap that holds no frame."""
+        """Count the kind of damage of a gap that contains no frame."""
         payload = unframed(gap) if length == len(gap) else None
         if payload is None or len(payload) < 3:
             self._counters.malformed += 1

@@ -1,12 +1,12 @@
-"""Sample frames that one flipped bit can make out of others without its checksum seeing it.
+"""Recognises sample frames that one flipped bit can make from others without its checksum noticing.
 
-A flipped bit in a data byte changes one byte, which CRC-16 always sees. A flipped bit in one of COBS's own bytes leads
-the decoder along another chain of zeros: wherever the old chain passed and the new one does not, a zero becomes the
-old chain's step, and the other way round. So what changes does not depend on the data, all chains can be followed, and
-of the 103 million changes that one bit can make to a frame of four readings, 1498 leave the checksum right (the tests
-follow them all). 694 make the type zero; 790 move the count, or the clock by 65 ms and more, and are out of place
-between the frames before and behind. The other 14 end in one of the four forms below, which no frame may have: what
-is refused with them are frames of these nine bytes, such as every 256th of those that read 0, 0, 4, 0 counts.
+A flipped bit in a data byte changes one byte, which CRC-16 always detects. A flipped bit in one of COBS's own bytes
+sends the decoder along another chain of zeros: where only the old chain passed, a zero becomes the old chain's step,
+and the other way round. The changes therefore do not depend on the data, and all chains can be followed. Of the 103
+million changes that one bit can make to a frame of four readings, 1498 leave the checksum right (the tests follow them
+all). 694 of these make the type zero; 790 change the count, or the clock by 65 ms and more, which is inconsistent with
+the frames before and behind. The other 14 end in one of the four forms below, which are refused. This also refuses
+undamaged frames with these nine bytes, such as every 256th of those that read 0, 0, 4, 0 counts.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from smartshoe.arrays import Index
 from smartshoe.devices.wire._checksums import Bytes
 
 FOUR_READINGS = 17  # bytes, from type to checksum
-# Place in the payload and value there.
+# Each form: positions in the payload and the values there.
 FORMS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((3, 0), (7, 2), (8, 0), (9, 1), (10, 2), (12, 5), (13, 0), (14, 0), (16, 0)),
     ((3, 5), (7, 0), (8, 5), (9, 0), (10, 0), (12, 0), (13, 1), (14, 2), (16, 1)),
@@ -27,10 +27,10 @@ FORMS: tuple[tuple[tuple[int, int], ...], ...] = (
 
 
 def may_be_flipped(payloads: Bytes) -> Index:
-    """Which of the ``payloads`` (length, n) have one of the forms."""
+    """Indices of the ``payloads`` (length, n) that have one of the forms."""
     if len(payloads) != FOUR_READINGS:
         return np.zeros(0, dtype=np.intp)
-    # Every form has small numbers in these two places, and few frames have.
+    # Every form has small values at these two positions, which few frames have.
     few = np.flatnonzero((payloads[7] | payloads[13]) < 8)
     found = [few[:0]]
     for form in FORMS:

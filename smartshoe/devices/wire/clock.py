@@ -1,19 +1,20 @@
-"""The device's clock on the host's: a line through the times of arrival, whatever delays the way had.
+"""Relates the device's clock to the host's: a line through the times of arrival, whatever the delays on the way.
 
 A sample taken at device time d arrives at
 
     host = offset + (1 + skew) d + latency + jitter,    jitter >= 0, and some samples delayed by seconds
 
-Arrivals alone cannot tell the offset from the latency: a constant delay looks like a clock set late. So times are right
-*up to one constant*, the delay that the first line ran through (only a round trip, or a press seen by the machine and
-the shoe alike, can find it). Skew, and every difference between times of one stream, are free of it.
+Arrivals alone cannot separate the offset from the latency: a constant delay looks like a clock set late. Times are
+therefore right *up to one constant*, the delay that the first line ran through (only a round trip, or a press seen by
+both the machine and the shoe, can determine it). The skew, and every difference between times of one stream, do not
+depend on it.
 
-Delays are gathered in bins of `BIN_S`. A bin gives its least delay, its tenth percentile and its median, and a robust
-line runs through each of these levels; another through all samples makes their arrivals likeliest under the law of
-delays that they show (`delay_law`). The surest line is taken: the likely one where delays are independent, a level
-where they have a pattern, as a timer's. Where the choice changes, the line goes on where it was, so that the constant
-stays one. The line is that of the last `KEPT_BINS` bins, since a crystal follows its temperature. Live and final times
-are of one estimator: the line so far, and the last one.
+Delays are collected in bins of `BIN_S`. Each bin gives its smallest delay, its tenth percentile and its median, and a
+robust line runs through each of these levels. A further line, the likely one, maximises the likelihood of all arrivals
+under the distribution of delays that they show (`delay_law`). The line with the smallest standard error is used: the
+likely one where delays are independent, a level where they have a pattern, such as a timer's. When the choice changes,
+the new line continues the old one, so that the constant stays the same. Lines cover the last `KEPT_BINS` bins, since a
+crystal follows its temperature. Live and final times use the same estimator: the line so far, and the last one.
 """
 
 from __future__ import annotations
@@ -37,23 +38,23 @@ Level = Literal["least", "tenth", "median", "likely"]
 
 LEVELS: tuple[Level, ...] = ("least", "tenth", "median")
 BIN_S = 0.25
-KEPT_BINS = 2400  # ten minutes
-MOST_SAMPLES = 150_000  # of which the likely line is made
+KEPT_BINS = 2400  # ten minutes of bins
+MOST_SAMPLES = 150_000  # used for the likely line
 FEW_BINS = 8
 LAW_FROM_BINS = 20
-FEWEST_KNOWN = 20  # delays, for a law of them
-ALIKE_BINS = 2  # within which errors may be alike
+FEWEST_KNOWN = 20  # exactly known delays needed to fit their distribution
+ALIKE_BINS = 2  # bins over which errors may be correlated
 SWITCH_GAIN = 0.7
-NEW_LINE = 20  # a new line when there is this part more
+NEW_LINE = 20  # a new line is fitted when the bins have grown by a twentieth
 
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
     """host = ``offset_s`` + (1 + ``skew_ppm`` 1e-6) (device - ``about_s``) + ``about_s``; sd one standard error.
 
-    ``about_s`` is the device time in the middle of what was fitted, where offset and skew are independent.
-    ``skew_ppm`` is positive where the device's clock is slow (its second is longer than the host's). ``level`` says
-    which delay the line runs through, ``samples`` and ``bins`` what it rests on.
+    ``about_s`` is the device time in the middle of the fitted samples, where offset and skew are independent.
+    ``skew_ppm`` is positive where the device's clock is slow (its second is longer than the host's). ``level`` is the
+    delay that the line runs through; ``samples`` and ``bins`` are the numbers that it is based on.
     """
 
     about_s: float
@@ -66,7 +67,7 @@ class ClockFit:
     samples: int
 
     def host_time(self, device_time_s: ArrayLike) -> Array:
-        """Device times in s on the host's clock, in s."""
+        """Device times in s converted to the host's clock, in s."""
         device = np.asarray(device_time_s, dtype=np.float64)
         return device + self.offset_s + self.skew_ppm * 1e-6 * (device - self.about_s)
 
@@ -77,15 +78,16 @@ class ClockFit:
 
 
 def at_once(work: Callable[[], None]) -> None:
-    """Do ``work`` now."""
+    """Run ``work`` in the calling thread."""
     work()
 
 
 class DeviceClock:
-    """A streaming `ClockFit`; begin a new one (or `reset`) when the device restarts.
+    """A `ClockFit` updated by a stream; begin a new one (or `reset`) when the device restarts.
 
-    To tell the delays' law takes a tenth of a second, seven times in the first ten minutes and once in ten from then
-    on. ``apart`` is given that work: it is done at once unless a reader, which must not wait, has it done in a thread.
+    Fitting the distribution of delays takes a tenth of a second, seven times in the first ten minutes and once in ten
+    minutes after that. ``apart`` runs that work: by default at once; a reader thread, which must not wait, runs it in
+    another thread.
     """
 
     def __init__(self, apart: Callable[[Callable[[], None]], None] = at_once) -> None:
@@ -93,7 +95,7 @@ class DeviceClock:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Return to the initial state, without any samples."""
         self._samples = 0
         self._origin = 0.0
         self._bin = 0
@@ -119,7 +121,7 @@ class DeviceClock:
         return self._fit
 
     def update(self, device_time_s: ArrayLike, arrival_s: ArrayLike) -> None:
-        """Take in samples of ``device_time_s`` (n,), rising, that came at ``arrival_s`` (n,) or all at one time."""
+        """Add samples of increasing ``device_time_s`` (n,) that arrived at ``arrival_s``, (n,) or one time for all."""
         device = np.atleast_1d(np.asarray(device_time_s, dtype=np.float64))
         if not device.size:
             return
@@ -143,12 +145,15 @@ class DeviceClock:
         if self._closed < FEW_BINS:
             self._fit = self._first_fit()
         elif self._closed >= self._line_due:
-            # A line moves little by what is little more: lines in step with the logarithm of time cost little.
+            # A few more bins change a line little: fitting at logarithmic intervals is cheap.
             self._line_due = self._closed + max(1, len(self._centres) // NEW_LINE)
             self._fit = self._fitted()
 
     def host_time(self, device_time_s: ArrayLike) -> Array:
-        """Device times in s on the host's clock by the line so far; raises `UsageError` before the first sample."""
+        """Device times in s converted to the host's clock by the present line.
+
+        Raises `UsageError` before the first sample.
+        """
         if self._fit is None:
             raise UsageError("the clock has no line yet: update it with at least one sample")
         return self._fit.host_time(device_time_s)
@@ -186,7 +191,7 @@ class DeviceClock:
         now, middle = float(centres[-1]), float(centres.mean())
         best = min(lines, key=lambda level: lines[level].sd_s(now))
         if self._level not in lines or lines[best].sd_s(now) < SWITCH_GAIN * lines[self._level].sd_s(now):
-            # In the middle of what both lines were fitted to, where they are surest of what lies between them.
+            # In the middle of their common data, where the distance of the two lines is known best.
             before = lines.get(self._level, lines["least"])
             self._shift_s += before.delay_s(middle) - lines[best].delay_s(middle)
             self._level = best
@@ -203,7 +208,10 @@ class DeviceClock:
         )
 
     def _follow_law(self, level: DelayLine) -> None:
-        """The likely line of what is kept; a new law from time to time, its line where the one before was."""
+        """Update the likely line of the stored samples.
+
+        From time to time refit the distribution, continuing the line.
+        """
         kept = _joined(self._kept)
         if (~kept.came_with).sum() < FEWEST_KNOWN:
             return
@@ -234,7 +242,7 @@ class DeviceClock:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Piece:
-    """Device times (n,), delays (n,), and which came together with the one before (n,)."""
+    """Device times (n,), delays (n,), and a mask (n,) of samples that arrived together with the one before."""
 
     time_s: Array
     delay_s: Array

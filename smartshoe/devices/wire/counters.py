@@ -1,4 +1,4 @@
-"""What a decoder has met so far."""
+"""Counts of what a decoder has met so far."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import asdict, dataclass
 
 @dataclass(slots=True)
 class Counters:
-    """Every frame (or line) that came is in exactly one of the first eight.
+    """Counts of frames by outcome; every frame (or line) is in exactly one of the first eight.
 
-    ``frames`` are the samples that were given out, ``information`` the information frames (comment and header
-    lines). ``bad_crc`` failed their checksum, ``malformed`` had no possible form, ``unknown_type`` are whole but of no
-    known type. ``duplicated`` came before already, ``late`` came after a later sample was given out, and
-    ``implausible`` contradicted the frames before and behind: none of the three is given out.
+    ``frames`` are the samples that were given out, ``information`` the information frames (comment and header lines).
+    ``bad_crc`` failed their checksum, ``malformed`` had an impossible form, ``unknown_type`` are intact but of an
+    unknown type. ``duplicated`` had arrived before, ``late`` arrived after a later sample was given out, and
+    ``implausible`` contradicted the frames before and behind: none of these three is given out.
 
-    ``lost`` are the samples that the device took and that were never given out (a late one stays lost);
-    ``resynchronisations`` counts how often a good frame was found after bad bytes; ``restarts`` are the device's;
-    ``bytes`` is all that was fed.
+    ``lost`` are the samples that the device took and that were never given out (a late one remains lost);
+    ``resynchronisations`` counts how often a good frame was found after bad bytes; ``restarts`` are those of the
+    device; ``bytes`` is the number of bytes fed.
     """
 
     frames: int = 0
@@ -34,9 +34,9 @@ class Counters:
 
     @property
     def bad(self) -> int:
-        """Frames or lines that could not be used: of bad checksum, form or type."""
+        """The number of frames or lines that could not be used because of checksum, form or type."""
         return self.bad_crc + self.malformed + self.unknown_type
 
     def as_dict(self) -> dict[str, int]:
-        """By name, for JSON."""
+        """The counts by name, for JSON."""
         return asdict(self)

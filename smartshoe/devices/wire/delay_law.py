@@ -1,13 +1,13 @@
-"""The law of a line's delays, told from arrivals that keep their order, and the line through them that it makes likely.
+"""The distribution of delays, from arrivals that keep their order, and the maximum-likelihood line through them.
 
-A serial line keeps the order of what is sent: a sample arrives with the one before it where it would have been the
-faster one. So of a sample that came later than its predecessor the delay is known; of one that came together with it
-only that its own delay was *at most* what was seen. A queue behind a slow sample, a packet and a stall of seconds are
-all of this kind, and tell next to nothing once this is said of them.
+A serial line keeps the order of samples: a sample that would be faster than the one before it arrives together with it.
+So the delay of a sample that arrived later than its predecessor is known; of one that arrived together with it, only
+that its own delay was *at most* the observed one. A queue behind a slow sample, a packet and a stall of seconds are all
+of this kind, and carry almost no information once they are treated so.
 
-The delays' law is a Pearson III (a gamma law from a floor on: from the exponential to the normal), of which
-`STRAY` are anything at all. It need not be the true one: the errors of the line are told from how its scores scatter
-from second to second (a sandwich estimate), not from the law.
+The delays' distribution is a Pearson III (a gamma distribution from a minimum on: from exponential to normal), with a
+share `STRAY` of arbitrary values. It need not be the true one: the line's errors are estimated from the scatter of its
+scores from second to second (a sandwich estimate), not from the distribution.
 """
 
 from __future__ import annotations
@@ -21,29 +21,32 @@ import numpy as np
 from smartshoe.arrays import Array, Integers, Mask
 from smartshoe.devices.wire.delay_line import CRYSTALS_SD, SETTLED, DelayLine, of_few
 
-CELLS = 600  # of the tables
+CELLS = 600  # in each table
 TOP = 0.995  # the quantile of the delays at which the tables end
 STRAY = 0.01
 LEAST_PROBABILITY = 1e-9
 ROUNDS = 12
-LONGEST_STEP = 3.0  # standard errors at once
+LONGEST_STEP = 3.0  # standard errors per iteration
 RESOLUTION_S = 1e-7
 
 
 class DelayLaw:
-    """Scores of delays above a line, from a law whose place on the delays' axis is kept: what a line runs through."""
+    """Scores of delays above a line, from a distribution with a fixed position: these determine the line."""
 
     def __init__(self, grid_s: Array, log_density: Array, log_probability: Array) -> None:
         self._first_s, self._width_s = float(grid_s[0]), float(grid_s[1] - grid_s[0])
         scores = [-np.gradient(table, self._width_s) for table in (log_density, log_probability)]
         curvatures = [np.gradient(table, self._width_s) for table in scores]
-        # What lies beyond the tables says nothing of the line. Known delays first, then those known not to be longer.
+        # Beyond the tables scores are 0. Exactly known delays first, then those that are only upper bounds.
         self._score = np.concatenate([np.pad(table, 1) for table in scores])
         self._curvature = np.concatenate([np.pad(table, 1) for table in curvatures])
 
     @classmethod
     def of(cls, delay_s: Array, came_with: Mask) -> Self:
-        """The likeliest law of delays (n,); ``came_with`` (n,) marks those that are only known to be no longer."""
+        """The maximum-likelihood distribution of delays (n,).
+
+        ``came_with`` (n,) marks those that are only upper bounds.
+        """
         from scipy.optimize import minimize
 
         exact = delay_s[~came_with]
@@ -81,7 +84,7 @@ class DelayLaw:
         return cls(edges[:-1] + width / 2.0, *_tables(best.x, edges, smoothing, middle, spread))
 
     def moved(self, by_s: float) -> DelayLaw:
-        """The same law, its line lower by ``by_s``."""
+        """The same distribution for a line that is lower by ``by_s``."""
         moved = copy(self)
         moved._first_s += by_s
         return moved
@@ -89,9 +92,9 @@ class DelayLaw:
     def line(
         self, time_s: Array, delay_s: Array, came_with: Mask, group: Integers, start: DelayLine
     ) -> DelayLine | None:
-        """The line through samples (n,) of ``group`` (n,), within which errors are alike, from ``start`` on.
+        """The line through samples (n,), starting from ``start``; errors may be correlated within each ``group`` (n,).
 
-        Skews of crystals are its prior. None where the samples do not tell one.
+        The usual skews of crystals are its prior. None where the samples do not determine a line.
         """
         about, offset, slope = start.about_s, start.offset_s, start.slope
         row = (CELLS + 2) * came_with + 1.5
@@ -102,7 +105,7 @@ class DelayLaw:
             place = (np.clip((rest - self._first_s) / self._width_s, -1.0, CELLS) + row).astype(np.intp)
             score, curvature = self._score[place], self._curvature[place]
             gradient = np.array([score.sum(), (lever * score).sum()]) - prior @ [0.0, slope]
-            # Minus the second derivative: the score falls as the line rises.
+            # Minus the second derivative, since the score decreases as the line rises.
             information = prior + _moments(curvature, lever)
             if information[0, 0] <= 0.0 or np.linalg.det(information) <= 0.0:
                 information = prior + _moments(score**2, lever)
@@ -119,28 +122,28 @@ class DelayLaw:
         sums = np.column_stack([np.bincount(group, score, count), np.bincount(group, lever * score, count)])
         inverse = np.linalg.inv(information)
         covariance = inverse @ (sums.T @ sums * (of_few(free) ** 2 * count / free) + prior) @ inverse
-        # Where offset and slope are independent.
+        # The time at which offset and slope are independent.
         shift = -float(covariance[0, 1] / covariance[1, 1])
         offset_sd = math.sqrt(max(float(covariance[0, 0] + shift * covariance[0, 1]), 0.0))
         return DelayLine(about + shift, offset + slope * shift, offset_sd, slope, math.sqrt(float(covariance[1, 1])))
 
 
 def _moments(weights: Array, lever: Array) -> Array:
-    # Sums, no products of vectors: those wake every core's thread for a few thousand numbers.
+    # Sums instead of vector products, which would start a thread per core for a few thousand numbers.
     of_lever = weights * lever
     first = float(of_lever.sum())
     return np.array([[float(weights.sum()), first], [first, float((of_lever * lever).sum())]])
 
 
 def _tables(shape: Array, edges: Array, smoothing: float, middle: float, spread: float) -> tuple[Array, Array]:
-    """Log density and log probability (CELLS,) of mean, spread and skewness, not told finer than ``smoothing``."""
+    """Log density and log probability (CELLS,) for given mean, spread and skewness, smoothed over ``smoothing``."""
     from scipy.special import gammainc
 
     width = float(edges[1] - edges[0])
     sd, skewness = spread * math.exp(min(shape[1], 20.0)), 2.0 / (1.0 + math.exp(-min(max(shape[2], -8.0), 20.0)))
     count, scale = 4.0 / skewness**2, sd * skewness / 2.0
     floor = middle + spread * shape[0] - count * scale
-    # Beyond the tables on both sides as well, so that smoothing has what it needs.
+    # Extended beyond the tables on both sides, as smoothing needs it.
     reach = math.ceil(4.0 * smoothing / width)
     wider = np.concatenate(
         [edges[0] + width * np.arange(-reach, 0), edges, edges[-1] + width * np.arange(1, reach + 1)]

@@ -1,4 +1,4 @@
-"""A straight line of delays against time: its errors, and the robust one through a level of binned delays."""
+"""A straight line of delays against time with its errors, and a robust fit of one through binned delays."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from smartshoe.signals.noise import NORMAL_95, robust_sd
 
 Number = TypeVar("Number", float, Array)
 
-CRYSTALS_SD = 100e-6  # what skews are before anything is known
-TUKEY = 4.685  # Huber 1981: 95 % of least squares' efficiency under normal noise
+CRYSTALS_SD = 100e-6  # prior standard deviation of skews
+TUKEY = 4.685  # 95 % of least squares' efficiency under normal noise (Huber 1981)
 ROUNDS = 10
 SETTLED = 0.05  # of a standard error
 
 
 @dataclass(frozen=True, slots=True)
 class DelayLine:
-    """delay = ``offset_s`` + ``slope`` (time - ``about_s``), where the two are independent, with standard errors."""
+    """delay = ``offset_s`` + ``slope`` (time - ``about_s``), with standard errors; the two are independent there."""
 
     about_s: float
     offset_s: float
@@ -30,16 +30,16 @@ class DelayLine:
     slope_sd: float
 
     def delay_s(self, time_s: Number) -> Number:
-        """The line's delay at ``time_s``."""
+        """The line's delay in s at ``time_s``."""
         return self.offset_s + self.slope * (time_s - self.about_s)
 
     def sd_s(self, time_s: float) -> float:
-        """Its standard error."""
+        """The standard error in s of the line's delay at ``time_s``."""
         return math.hypot(self.offset_sd_s, self.slope_sd * (time_s - self.about_s))
 
 
 def of_few(free: float) -> float:
-    """What a standard error told from ``free`` degrees of freedom is to be multiplied by, so that 1.96 hold 95 %.
+    """Factor for a standard error with ``free`` degrees of freedom such that 1.96 of them cover 95 %.
 
     Student's quantile over the normal one, to first order.
     """
@@ -47,7 +47,10 @@ def of_few(free: float) -> float:
 
 
 def robust_line(time_s: Array, delay_s: Array) -> DelayLine:
-    """The straight line through ``delay_s`` (n,), by reweighted least squares; skews of crystals are its prior."""
+    """The straight line through ``delay_s`` (n,), by reweighted least squares.
+
+    The usual skews of crystals are its prior.
+    """
     weights = np.ones_like(delay_s)
     slope = 0.0
     about, offset, scatter, spread = float(time_s.mean()), float(np.median(delay_s)), math.inf, 1.0
@@ -67,7 +70,7 @@ def robust_line(time_s: Array, delay_s: Array) -> DelayLine:
         moved = np.abs(offset + slope * lever[[0, -1]] - ends_before)
         if moved.max() < SETTLED * scatter / math.sqrt(total):
             break
-    # Least delays scatter to one side: the median distance alone would say too little of them.
+    # Smallest delays scatter to one side, which the median distance alone underestimates.
     rest = delay_s - offset - slope * (time_s - about)
     inside = np.abs(rest) < TUKEY * scatter
     scatter = max(scatter, float(np.sqrt(np.mean(rest[inside] ** 2))) if inside.any() else 0.0)

@@ -1,4 +1,4 @@
-"""Binary frames: bytes to samples and back. The format is specified in docs/wire.md."""
+"""Decodes binary frames to samples, and encodes them. docs/wire.md specifies the format."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ __all__ = [
 ]
 
 NO_READING = MOST_COUNTS + 1
-MOST_CHANNELS = 100  # beyond, a frame would be longer than one block of COBS
+MOST_CHANNELS = 100  # with more, a frame would exceed one block of COBS
 
 
 class FrameDecoder:
-    """Samples of the named ``channels`` from binary frames, in any chunks: the same samples whatever the chunks.
+    """Samples of the named ``channels`` from binary frames; how the bytes are divided into chunks does not matter.
 
-    Readings are counts; `Information.scale` makes them readings in the device's unit, once ``information`` came.
-    The first frame of all, and any that follows a long gap, is given out with the next one, which must agree with it.
+    Readings are counts; `Information.scale` converts them to the device's unit once ``information`` has arrived. The
+    first frame, and any that follows a long gap, is given out together with the next one, which must agree with it.
     """
 
     def __init__(self, channels: Sequence[str] = CHANNELS) -> None:
@@ -63,14 +63,14 @@ class FrameDecoder:
         self._present = np.zeros(len(self._names))
 
     def reset(self) -> None:
-        """After a reconnection: the frame that had only begun is forgotten; counters and what is known stay.
+        """Discard the incomplete frame after a reconnection; counters and the known state of the stream are kept.
 
-        Whether the device ran on or restarted meanwhile shows in its next two frames (`Samples.boot`).
+        The next two frames show whether the device kept running or restarted meanwhile (`Samples.boot`).
         """
         self._scanner.reset()
 
     def feed(self, data: bytes) -> Samples:
-        """The samples that became sure with ``data``, maybe none."""
+        """The samples that ``data`` confirms, possibly none."""
         scanned = self._scanner.feed(data)
         if scanned.information is not None:
             self.information = scanned.information
@@ -100,7 +100,7 @@ class FrameDecoder:
         )
 
     def _carried(self, values: Array, missing: Mask) -> Array:
-        """``values`` with the last reading that was there in place of those missing."""
+        """``values`` with missing readings replaced by the last ones present."""
         if missing.any():
             whole = np.concatenate([self._present[None, :], values])
             places = np.arange(len(whole))[:, None]
@@ -111,10 +111,10 @@ class FrameDecoder:
 
 
 def encode_samples(sequence: ArrayLike, device_us: ArrayLike, readings: ArrayLike) -> bytes:
-    """Sample frames, one after the other: ``sequence`` and ``device_us`` (n,), ``readings`` (n, channels) in counts.
+    """Sample frames, one after another: ``sequence`` and ``device_us`` (n,), ``readings`` (n, channels) in counts.
 
-    Count and clock are cut to 16 and 32 bits, as a device's are. Readings are rounded; NaN is sent as no reading;
-    raises `UsageError` beyond 0 to 65534 counts. Each frame has the same length, its last byte is zero.
+    Count and clock are truncated to 16 and 32 bits, like a device's. Readings are rounded; NaN is sent as no reading;
+    raises `UsageError` beyond 0 to 65534 counts. Each frame has the same length, and its last byte is zero.
     """
     values = np.atleast_2d(np.asarray(readings, dtype=np.float64))
     counts = np.where(np.isnan(values), NO_READING, np.rint(values))
@@ -136,7 +136,7 @@ def _little(values: Integers, kind: str) -> NDArray[np.uint8]:
 
 
 def _with_cobs(payload: NDArray[np.uint8]) -> bytes:
-    """COBS around each row (n, length <= 253), a zero behind: each zero becomes the way to the next one."""
+    """Each row (n, length <= 253) COBS-encoded and followed by a zero: zeros become the distance to the next one."""
     n, length = payload.shape
     encoded = np.zeros((n, length + 2), dtype=np.uint8)
     code = np.ones(n, dtype=np.uint8)
@@ -149,5 +149,5 @@ def _with_cobs(payload: NDArray[np.uint8]) -> bytes:
 
 
 def encode_information(information: Information) -> bytes:
-    """The information frame, with a zero before it."""
+    """The information frame, preceded by a zero."""
     return b"\0" + framed(bytes([INFORMATION]) + information.to_text().encode("ascii"))

@@ -1,4 +1,4 @@
-"""What a device says of itself, as the text that its information frame carries."""
+"""The information that a device gives about itself, and its text in the information frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from smartshoe.errors import FormatError
 from smartshoe.units import COUNTS, declared, find_unit
 
 PROTOCOL = 1
-MOST_COUNTS = 0xFFFE  # 0xFFFF says that there is no reading
+MOST_COUNTS = 0xFFFE  # 0xFFFF means that there is no reading
 LONGEST_TEXT = 480
 
 
@@ -28,7 +28,7 @@ class ChannelInformation:
 
 @dataclass(frozen=True, slots=True)
 class Information:
-    """What the device is and how its counts read; ``full_scale_counts`` is at most 65534."""
+    """The device's identity and the scales of its channels; ``full_scale_counts`` is at most 65534."""
 
     firmware: str
     serial_number: str
@@ -47,7 +47,7 @@ class Information:
         return tuple(channel.name for channel in self.channels)
 
     def to_text(self) -> str:
-        """The information frame's text: printable ASCII, ``key=value`` pairs with semicolons between."""
+        """The information frame's text: printable ASCII, ``key=value`` pairs separated by semicolons."""
         channels = ",".join(f"{c.name}:{c.unit}:{_short(c.low)}:{_short(c.high)}" for c in self.channels)
         return (
             f"protocol={PROTOCOL};firmware={self.firmware};serial={self.serial_number};"
@@ -56,7 +56,7 @@ class Information:
 
     @classmethod
     def from_text(cls, text: str) -> Information:
-        """Read `to_text`'s text, whatever keys stand beside its own; raises `FormatError` where it is none."""
+        """Parse the text of `to_text`, ignoring unknown keys; raises `FormatError` for any other text."""
         fields = dict(part.split("=", 1) for part in text.split(";") if "=" in part)
         try:
             if int(fields["protocol"]) != PROTOCOL:
@@ -82,9 +82,9 @@ class Information:
             raise FormatError(f"information frame with a value that is none ({error}): see docs/wire.md") from error
 
     def scale(self, samples: Samples) -> Samples:
-        """``samples`` in counts as readings in the channels' unit; other samples come back unchanged.
+        """``samples`` converted from counts to the channels' unit; samples in another unit are returned unchanged.
 
-        Channels of one quantity come in the first one's unit; where quantities differ, counts stay counts.
+        Channels of one quantity are all converted to the first one's unit; where quantities differ, counts stay counts.
         """
         if samples.unit != COUNTS or samples.readings.shape[1] != len(self.channels):
             return samples

@@ -1,7 +1,8 @@
-"""Text lines, as most microcontroller sketches print them: ``t,toe,meta1,meta4,heel`` and what they do to them.
+"""Text lines, as most microcontroller sketches print them: ``t,toe,meta1,meta4,heel`` and common variants of it.
 
-Lines carry no count and mostly no checksum, so that a digit that was changed underway passes; docs/wire.md says how a
-sketch adds an NMEA checksum (``*5A``), which is checked wherever it stands and asked of every line once one had it.
+Lines carry no count and mostly no checksum, so that a digit changed on the way goes unnoticed. docs/wire.md explains
+how a sketch adds an NMEA checksum (``*5A``), which is verified wherever it is present, and required of every line once
+one had it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _FULL_SCALE = 4095
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """Which field of a line is the time and which are the channels; how many fields there are."""
+    """Which fields of a line are the time and the channels, and how many fields there are."""
 
     time: int
     channels: tuple[int, ...]
@@ -40,13 +41,13 @@ class _Layout:
 
 
 class LineDecoder:
-    """Samples from text lines, in any chunks: the same samples whatever the chunks.
+    """Samples from text lines; how the bytes are divided into chunks does not matter.
 
-    ``columns`` are the lines' columns: time (``t``, ``time``, ``millis`` or ``micros``), then a name a channel. A
-    header line with these names, in any order, with or without units (``time_ms,toe_mbar,...``), goes before
-    ``columns``, ``time`` and ``unit``. ``time`` "auto" tells the unit from the first steps. ``unit`` is the readings',
-    counts where nothing is said. Separators are tabs, semicolons, commas or blanks, whichever a line has.
-    Comment lines (``#``) may say ``firmware``, ``serial`` and ``rate`` (``# serial: L-0042``).
+    ``columns`` are the lines' columns: time (``t``, ``time``, ``millis`` or ``micros``), then one name per channel. A
+    header line with these names, in any order, with or without units (``time_ms,toe_mbar,...``), takes precedence over
+    ``columns``, ``time`` and ``unit``. ``time`` "auto" infers the unit from the first steps. ``unit`` is that of the
+    readings, by default counts. Separators are tabs, semicolons, commas or blanks, whichever a line has. Comment lines
+    (``#``) may state ``firmware``, ``serial`` and ``rate`` (``# serial: L-0042``).
     """
 
     def __init__(
@@ -80,12 +81,12 @@ class LineDecoder:
         self._present = np.zeros(len(self._names))
 
     def reset(self) -> None:
-        """After a reconnection: the line that had only begun is forgotten; counters and what is known stay."""
+        """Discard the incomplete line after a reconnection; counters and the known state of the stream are kept."""
         self._is_lost |= bool(self._rest)
         self._rest, self._is_cut = b"", False
 
     def feed(self, data: bytes) -> Samples:
-        """The samples that became sure with ``data``, maybe none."""
+        """The samples that ``data`` confirms, possibly none."""
         self.counters.bytes += len(data)
         data = self._rest + data
         *whole, rest = data.replace(b"\r", b"\n").split(b"\n")
@@ -110,7 +111,7 @@ class LineDecoder:
         self._is_lost = True
 
     def _read(self, line: bytes, end: int, lines: list[ReadingLine]) -> None:
-        """One line, whole at byte ``end``: a sample onto ``lines`` (once it is sure), a header, a comment, garbage."""
+        """Process one line ended at byte ``end``: reading (appended to ``lines`` once confirmed), header or other."""
         try:
             text = line.decode("utf-8").strip().lstrip("\ufeff\0")
         except UnicodeDecodeError:
@@ -147,7 +148,7 @@ class LineDecoder:
     def _sample(self, fields: list[str], end: int) -> ReadingLine | None:
         layout = self._layout
         if len(fields) == layout.fields + 1 and not fields[-1]:
-            fields = fields[:-1]  # a sketch's loop prints a separator behind every number
+            fields = fields[:-1]  # a sketch's loop prints a separator after every number
         if len(fields) != layout.fields:
             return None
         time = number(without_label(fields[layout.time]))
@@ -163,7 +164,7 @@ class LineDecoder:
         return ReadingLine(time, tuple(readings), end=end)
 
     def _take_header(self, fields: list[str]) -> bool:
-        """Whether the fields are a header with this decoder's columns; if so it holds from here."""
+        """Whether the fields are a header with this decoder's columns, which then applies from here on."""
         if not fields[-1]:
             fields = fields[:-1]
         named = [_name_and_unit(field) for field in fields]
@@ -176,7 +177,7 @@ class LineDecoder:
         units = {found for place in channels if (found := named[place][1]) is not None}
         unit = units.pop() if len(units) == 1 else self._unit
         if self._has_samples and unit != self._unit:
-            return False  # readings before and after could not stand in one block
+            return False  # readings before and after could not be in one block
         self._unit, self._layout = unit, _Layout(times[0], channels, len(fields))
         time_unit = named[times[0]][1]
         name = time_unit.symbol if time_unit is not None else named[times[0]][0].casefold()
@@ -198,7 +199,7 @@ class LineDecoder:
         try:
             self.information = Information(self._said.get("firmware", "?"), self._said["serial"], rate, channels)
         except FormatError:
-            return  # a comment that cannot be an information is a comment
+            return  # a comment that is not valid information remains a comment
 
     def _samples(self, lines: list[ReadingLine]) -> Samples:
         if not lines:
@@ -222,7 +223,7 @@ class LineDecoder:
 
 
 def number(text: str) -> float | None:
-    """The number that ``text`` writes out, None where it writes none (``1_0`` and ``infinity`` are none)."""
+    """The number in ``text``, or None (also for ``1_0`` and ``infinity``)."""
     plain = text.strip()
     if not plain or not set(plain) <= _OF_NUMBERS:
         return None
@@ -236,13 +237,13 @@ _OF_NUMBERS = frozenset("0123456789+-.eE")
 
 
 def without_label(field: str) -> str:
-    """A field without the label that Arduino's serial plotter wants: ``12.3`` of ``toe:12.3``."""
+    """A field without the label of Arduino's serial plotter: ``12.3`` for ``toe:12.3``."""
     label, colon, value = field.partition(":")
     return value.strip() if colon and label.strip().isidentifier() else field
 
 
 def split_fields(text: str) -> list[str]:
-    """A line's fields: between tabs or semicolons (a comma is a decimal one then), else commas, else blanks.
+    """A line's fields, separated by tabs or semicolons (commas are then decimal marks), else commas, else blanks.
 
     A line that ends in a separator has an empty last field.
     """
@@ -255,7 +256,7 @@ def split_fields(text: str) -> list[str]:
 
 
 def _name_and_unit(text: str) -> tuple[str, Unit | None]:
-    """``toe_mbar``, ``toe [mbar]`` or ``toe (mbar)`` as name and unit."""
+    """``toe_mbar``, ``toe [mbar]`` or ``toe (mbar)`` split into name and unit."""
     plain = text.strip()
     if plain.endswith(("]", ")")):
         name, _, inside = plain.replace("(", "[").partition("[")
@@ -266,12 +267,12 @@ def _name_and_unit(text: str) -> tuple[str, Unit | None]:
 
 
 def _is_checked(body: str, check: str) -> bool:
-    """Whether ``check`` is NMEA's: two hexadecimal digits of all the body's bytes XORed."""
+    """Whether ``check`` is the NMEA checksum of ``body``: two hexadecimal digits of all its bytes XORed."""
     return len(check) == 2 and check.upper() == f"{line_checksum(body):02X}"
 
 
 def line_checksum(body: str) -> int:
-    """All bytes of ``body`` XORed, as NMEA 0183 has it."""
+    """The XOR of all bytes of ``body``, as in NMEA 0183."""
     total = 0
     for byte in body.encode("utf-8"):
         total ^= byte
@@ -281,7 +282,7 @@ def line_checksum(body: str) -> int:
 def encode_lines(
     time: ArrayLike, readings: ArrayLike, separator: str = ",", decimals: int = 3, is_checksummed: bool = False
 ) -> bytes:
-    """Lines of ``time`` (n,), as numbers of whatever unit, and ``readings`` (n, channels); NaN is an empty field."""
+    """Lines of ``time`` (n,), in any unit, and ``readings`` (n, channels); NaN becomes an empty field."""
     values = np.atleast_2d(np.asarray(readings, dtype=np.float64))
     lines = []
     for moment, row in zip(np.atleast_1d(np.asarray(time)).tolist(), values.tolist(), strict=True):
@@ -298,5 +299,5 @@ def _written(value: float, decimals: int) -> str:
 
 
 def encode_header(names: Iterable[str] = COLUMNS, separator: str = ",") -> bytes:
-    """The header line."""
+    """The header line with these column ``names``, including the newline."""
     return (separator.join(names) + "\n").encode("ascii")

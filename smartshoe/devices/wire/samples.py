@@ -1,4 +1,4 @@
-"""What a decoder gives: samples with their place in the device's count and on the device's clock."""
+"""The output of a decoder: samples with their place in the device's count and on the device's clock."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ CHANNELS = ("toe", "meta1", "meta4", "heel")
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples in order, none twice.
+    """Samples in order, without repetitions.
 
-    ``sequence`` (n,) counts samples and ``device_time_s`` (n,) is the device's clock, both unwrapped over the wire's
-    16 and 32 bits and over loss; ``boot`` (n,) counts how often the device had restarted by then: sequence and time
-    start anew with each. ``readings`` (n, channels) in ``unit``; where ``missing`` (n, channels), the last reading
-    that was there, or 0. ``end`` (n,) is how many bytes of the stream had come when each was whole: whoever knows when
-    bytes came knows by it when each sample did, however many were decoded together.
+    ``sequence`` (n,) counts samples and ``device_time_s`` (n,) is the device's clock, both unwrapped beyond the wire's
+    16 and 32 bits and continued over losses. ``boot`` (n,) counts the device's restarts so far; sequence and time begin
+    again with each. ``readings`` (n, channels) are in ``unit``; where ``missing`` (n, channels), the last reading
+    present, or 0. ``end`` (n,) is the number of bytes of the stream up to the end of each sample: from the arrival
+    times of bytes it gives those of samples, however many are decoded together.
     """
 
     sequence: Integers
@@ -38,14 +38,14 @@ class Samples:
 
     @classmethod
     def empty(cls, names: tuple[str, ...] = CHANNELS, unit: Unit = COUNTS) -> Samples:
-        """No samples."""
+        """Zero samples with these channels and unit."""
         none = np.zeros(0, dtype=np.int64)
         shape = (0, len(names))
         return cls(none, np.zeros(0), np.zeros(shape), np.zeros(shape, dtype=bool), names, unit, none, none)
 
 
 def join_samples(parts: Sequence[Samples]) -> Samples:
-    """Consecutive samples of one decoder as one; at least one part."""
+    """Consecutive samples of one decoder joined; at least one part."""
     if len(parts) == 1:
         return parts[0]
     return replace(

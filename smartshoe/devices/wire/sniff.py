@@ -1,4 +1,4 @@
-"""What bytes look like, for the choice of a decoder and for a sentence that helps."""
+"""Recognises what kind of stream bytes are, to choose a decoder and to explain a failure."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _TEXT = re.compile(rb"[\x20-\x7e\t\r\n]")
 
 
 def guess(data: bytes) -> Format | None:
-    """The format of ``data``: frames where one passes its checksum, lines where one holds numbers; else None."""
+    """The format of ``data``: frames if one passes its checksum, lines if one contains numbers, else None."""
     if any(_is_frame(gap) for gap in data.split(b"\0")):
         return "frames"
-    # The first line may be a half, the last one unfinished.
+    # The first line may be incomplete, and so may the last one.
     whole = [line for line in _lines(data)[1:-1] if line]
     numbers = [count for line in whole if (count := _numbers(line)) >= 2]
     if len(numbers) >= 2 and 2 * len(numbers) > len(whole) and _share_of_text(data) > 0.8:
@@ -28,7 +28,7 @@ def guess(data: bytes) -> Format | None:
 
 
 def looks_like(data: bytes, columns: int = 5, channels: int = 4) -> str:
-    """One clause for an error: what ``data`` is, where a frame of ``channels`` or lines of ``columns`` were awaited."""
+    """A clause for an error message: what ``data`` is instead of frames of ``channels`` or lines of ``columns``."""
     if not data:
         return "no bytes at all"
     extremes = Counter(data)[0] + Counter(data)[0xFF]
@@ -76,7 +76,7 @@ def _looks_like_text(data: bytes, columns: int) -> str:
 
 
 def _repeats(lines: list[str]) -> bool:
-    """Whether a tenth and more of the lines begin as the line before does."""
+    """Whether at least a tenth of the lines begin like the line before."""
     firsts = [split_fields(line)[0] for line in lines]
     same = sum(before == here for before, here in pairwise(firsts))
     return 10 * same >= len(firsts)
@@ -87,7 +87,7 @@ def _lines(data: bytes) -> list[str]:
 
 
 def _numbers(line: str) -> int:
-    """How many numbers a line holds, 0 where it holds anything else."""
+    """The number of numbers in a line, 0 if it contains anything else."""
     fields = split_fields(line.rpartition("*")[0] or line)
     fields = fields[: len(fields) - (not fields[-1])] if fields else fields
     values = [number(without_label(field)) for field in fields if field]

@@ -1,7 +1,7 @@
-"""The one gate through which everything from outside comes in: files, names, JSON, and readers that others wrote.
+"""Checks everything that comes from outside: files, names, JSON, and readers of other packages.
 
-Behind it numbers are finite, sizes bounded before memory is taken, names inside their folder, and any fault is one
-sentence (`smartshoe.errors`).
+After these checks numbers are finite, sizes are bounded before memory is allocated, names stay inside their folder, and
+any fault is one sentence (`smartshoe.errors`).
 """
 
 from smartshoe.files.gate._files import read_bytes, read_text, require_regular_file

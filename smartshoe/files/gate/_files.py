@@ -1,4 +1,4 @@
-"""Files as they come from outside: regular ones only, read within a bound."""
+"""Reads files from outside: regular files only, up to a bounded size."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _KINDS = (
 def require_regular_file(path: Path, *, at_most: int | None = None) -> int:
     """The size in bytes of the regular file at ``path``.
 
-    Raises `InputError` where there is none, where it is a folder, pipe or device (which may never end), and where it
-    is larger than ``at_most`` (default: the limit ``file_bytes``).
+    Raises `InputError` where it does not exist, where it is a folder, pipe or device (which may never end), and where
+    it is larger than ``at_most`` (default: the limit ``file_bytes``).
     """
     if path.name == "-" and not path.exists():
         raise InputError(f"{path} is no file, and standard input cannot be read: write its content to a file first")
@@ -31,7 +31,7 @@ def require_regular_file(path: Path, *, at_most: int | None = None) -> int:
         raise InputError(f"{path} does not exist: check its name and folder") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}): check its name and permissions") from error
-    except ValueError as error:  # a name with a zero byte
+    except ValueError as error:  # a name that contains a zero byte
         raise InputError(f"{str(path)!r} is no name of a file ({error}): check it") from error
     for is_kind, what, mend in _KINDS:
         if is_kind(state.st_mode):
@@ -46,7 +46,7 @@ def require_regular_file(path: Path, *, at_most: int | None = None) -> int:
 
 
 def read_bytes(path: Path, *, at_most: int | None = None) -> bytes:
-    """The content of the regular file at ``path``; raises `InputError` as `require_regular_file` does."""
+    """The content of the regular file at ``path``; raises the errors of `require_regular_file`."""
     size = require_regular_file(path, at_most=at_most)
     try:
         with path.open("rb") as file:
@@ -57,9 +57,9 @@ def read_bytes(path: Path, *, at_most: int | None = None) -> bytes:
 
 
 def read_text(path: Path, what: str) -> str:
-    """The UTF-8 text of a small file, without the mark that some editors put before it; raises `InputError`.
+    """The UTF-8 text of a small file, without a leading byte order mark; raises `InputError`.
 
-    ``what`` it should be ("a calibration") is for the message.
+    ``what`` the file should be ("a calibration") is named in the message.
     """
     content = read_bytes(path, at_most=limits().json_bytes)
     try:

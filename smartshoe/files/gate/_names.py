@@ -1,4 +1,4 @@
-"""Names that come from files and command lines, on their way to becoming paths: none leads out of its folder."""
+"""Checks names from files and command lines before they become paths: none leads out of its folder."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from smartshoe.errors import InputError, UsageError
 
-LONGEST_NAME_BYTES = 180  # of a file's 255: endings and temporary names need the rest
+LONGEST_NAME_BYTES = 180  # of 255 in a file name: suffixes and temporary names need the rest
 _FORBIDDEN = frozenset('/\\:*?"<>|')
 _RESERVED = frozenset({"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))})
 
 
 def require_file_name(name: str, what: str) -> str:
-    """``name`` unchanged, where it can be a file's name on any system; ``what`` it names ("unit") for the message.
+    """``name`` unchanged, if it is a valid file name on any system; ``what`` it names ("unit") is for the message.
 
-    Any script will do; raises `UsageError` for separators, for the characters that Windows forbids, for control
-    characters, for a dot in front, for nothing and for too much.
+    Any script is allowed. Raises `UsageError` for separators, for the characters that Windows forbids, for control
+    characters, for a leading dot, and for an empty or too long name.
     """
     fault = _fault(name)
     if fault:
@@ -40,9 +40,10 @@ def _fault(name: str) -> str:
 
 
 def inside(folder: Path, name: str, said_by: Path | str) -> Path:
-    """The path of ``name`` (``raw/log.csv``) within ``folder``; the one way by which a file's text becomes a path.
+    """The path of ``name`` (``raw/log.csv``) within ``folder``; paths given in a file's content are only made here.
 
-    Raises `InputError` naming ``said_by`` where the name is absolute, climbs out, or leads out by a link.
+    Raises `InputError` naming ``said_by`` where the name is absolute, or leads out of the folder by ``..`` or by a
+    link.
     """
     parts = PurePosixPath(name.replace("\\", "/")).parts
     shown = name if len(name) <= 60 else f"{name[:60]}..."
@@ -60,6 +61,6 @@ def inside(folder: Path, name: str, said_by: Path | str) -> Path:
     try:
         if not path.resolve().is_relative_to(folder.resolve()):
             raise refused
-    except (OSError, RuntimeError) as error:  # a loop of links
+    except (OSError, RuntimeError) as error:  # links that form a loop
         raise refused from error
     return path

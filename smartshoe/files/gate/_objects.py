@@ -1,4 +1,4 @@
-"""JSON from outside: finite numbers, bounded depth and size."""
+"""Parses JSON from outside: finite numbers, bounded depth and size."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 from smartshoe.files.gate.limits import limits
 
-_MOST_DIGITS = 400  # of a number as it is written; float64 ends at 309 before the point
+_MOST_DIGITS = 400  # of a number as written; float64 has at most 309 before the point
 
 
 def parsed_json(text: str | bytes) -> Any:
-    """The JSON ``text`` as objects.
+    """The JSON ``text`` as Python objects.
 
-    Raises `ValueError` for what is none, for NaN, infinity, numbers beyond float64, and for more bytes or depth than
+    Raises `ValueError` for invalid JSON, for NaN, infinity and numbers beyond float64, and where size or depth exceed
     the limits.
     """
     if len(text) > limits().json_bytes:

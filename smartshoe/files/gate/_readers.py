@@ -1,4 +1,4 @@
-"""Readers that others wrote: whatever they raise becomes one sentence, and what a file declares is weighed first."""
+"""Guards readers of other packages: any exception becomes one sentence, and a file's declared sizes are checked."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _LONGEST_REASON = 80
 def foreign_code(path: Path, kind: str, mend: str) -> Iterator[None]:
     """Within the block a library reads the untrusted ``path`` as ``kind`` ("TDMS file").
 
-    Whatever it raises on the way, from a missing key to a memory that is too small, is a `FormatError` that names the
-    file and says how to ``mend`` it: a library's list of exceptions is not part of its promises. The cause is chained.
+    Any exception, from a missing key to insufficient memory, becomes a `FormatError` that names the file and says how
+    to ``mend`` it, since a library does not promise which exceptions it raises. The cause is chained.
     """
     try:
         yield
@@ -44,7 +44,8 @@ def require_columns(path: Path, count: int) -> None:
 def require_values(path: Path, count: int, size: int | None = None, *, item_bytes: int = 8) -> None:
     """Raise `InputError` where a file declares more values than the limit, or far more than its ``size`` can hold.
 
-    ``count`` values of ``item_bytes`` are what it says it unpacks to, ``size`` its bytes on disk (None: not asked).
+    It declares ``count`` values of ``item_bytes`` once unpacked; ``size`` is its number of bytes on disk (None: not
+    checked).
     """
     bound = limits()
     if count > bound.values:

@@ -1,4 +1,4 @@
-"""How much a file or a protocol may ask for before it is refused; raised by ``--limit`` or ``$SMARTSHOE_LIMITS``."""
+"""Limits of what a file or a protocol may request; they can be raised by ``--limit`` or ``$SMARTSHOE_LIMITS``."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ VARIABLE = "SMARTSHOE_LIMITS"
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The largest that is let in.
+    """The largest sizes that are accepted.
 
-    ``values`` are samples times channels of one file; ``expansion`` is how many times larger than its file the
-    content of a compressed one may be (what unpacks to less than `FREELY_UNPACKED` bytes is not asked).
-    ``json_bytes`` and ``json_depth`` hold for calibrations, plans, events and indices. ``segments`` are those of a
-    protocol, ``duration_s`` is its time or a simulated stream's. ``samples`` are those that a simulated pressing
-    computes at its fine step, about 170 bytes each; ``cases`` those of a sweep.
+    ``values`` are samples times channels of one file; ``expansion`` is how many times larger than its file the content
+    of a compressed one may be (not checked below `FREELY_UNPACKED` bytes). ``json_bytes`` and ``json_depth`` apply to
+    calibrations, plans, events and indices. ``segments`` are those of a protocol, ``duration_s`` is its duration or
+    that of a simulated stream. ``samples`` are those that a simulated pressing computes at its fine step, about 170
+    bytes each; ``cases`` are those of a sweep.
     """
 
     file_bytes: int = 4 << 30
@@ -40,7 +40,7 @@ _raised: list[str] = []
 
 
 def raise_limits(settings: Iterable[str]) -> None:
-    """Let ``NAME=NUMBER`` of ``settings`` hold in this process; raises `UsageError` for what is no limit."""
+    """Set limits of this process from texts ``NAME=NUMBER``; raises `UsageError` for an unknown limit."""
     before = list(_raised)
     _raised[:] = settings
     limits.cache_clear()
@@ -53,7 +53,7 @@ def raise_limits(settings: Iterable[str]) -> None:
 
 @cache
 def limits() -> Limits:
-    """The limits that hold: the built-in ones, changed by ``$SMARTSHOE_LIMITS`` and `raise_limits`."""
+    """The limits in force: the built-in ones, changed by ``$SMARTSHOE_LIMITS`` and `raise_limits`."""
     known = {field.name for field in fields(Limits)}
     changed: dict[str, int] = {}
     for setting in (*os.environ.get(VARIABLE, "").split(","), *_raised):

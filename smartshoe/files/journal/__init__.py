@@ -1,4 +1,4 @@
-"""Data that must not be lost: appended to a file, checked, on disk before anyone learns of it."""
+"""Storage for data that must not be lost: appended to a file with checksums, and on disk before it is confirmed."""
 
 from smartshoe.files.journal._appending import AppendedFile
 from smartshoe.files.journal._journal import Contents, Journal, read_journal

@@ -1,4 +1,4 @@
-"""`AppendedFile`: pieces that reach the end of a file whole and on disk, or not at all."""
+"""`AppendedFile`: pieces are appended to a file completely and on disk, or not at all."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from smartshoe.files.atomic import sync_folder
 class AppendedFile:
     """A file that only grows; not for several writers at once.
 
-    `append` returns when the piece is on disk (``fdatasync`` after each piece; with ``synced`` False it is only handed
-    to the operating system until the next one that is, which a kill leaves intact and a pulled plug does not). Where
-    the disk is full the part that was written is cut off again, so that the file ends with the last whole piece.
+    `append` returns when the piece is on disk (``fdatasync`` after each piece). With ``synced`` False the piece is only
+    handed to the operating system until the next synced one: it survives a kill, but not a power failure. Where the
+    disk is full, a partly written piece is cut off again, so that the file ends with the last complete one.
     """
 
     def __init__(self, path: Path | str, *, new: bool = False) -> None:
-        """Open ``path`` for appending; ``new`` raises `UsageError` where it is there already."""
+        """Open ``path`` for appending; ``new`` raises `UsageError` where it already exists."""
         self.path = Path(path)
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | (os.O_EXCL if new else 0) | getattr(os, "O_BINARY", 0)
         try:
@@ -32,11 +32,11 @@ class AppendedFile:
                 f"{self.path} cannot be written ({error.strerror}): choose a folder that exists and is writable"
             ) from error
         self.size = os.fstat(self._handle).st_size
-        if self.size == 0:  # made just now, or by a writer that a pulled plug may have kept from syncing its name
+        if self.size == 0:  # just created, or by a writer whose sync of the name a power failure prevented
             sync_folder(self.path.parent)
 
     def append(self, piece: bytes, *, synced: bool = True) -> None:
-        """Put ``piece`` at the end; raises `InputError` where the disk does not take it, with nothing half-written."""
+        """Append ``piece``; raises `InputError`, with nothing half-written, where the disk does not accept it."""
         if self._handle is None:
             raise UsageError(f"{self.path} is closed: open it anew to append")
         done = 0
@@ -69,10 +69,10 @@ class AppendedFile:
         self.size = size
 
     def lock(self) -> bool:
-        """Keep every other writer out until the file is closed; False where another one is in."""
+        """Lock out other writers until the file is closed; False where another one holds the lock."""
         try:
             import fcntl
-        except ImportError:  # no such locks on Windows
+        except ImportError:  # Windows lacks these locks
             return True
         if self._handle is None:
             return False
@@ -83,7 +83,7 @@ class AppendedFile:
         return True
 
     def close(self) -> None:
-        """Close the file; what was appended stays."""
+        """Close the file; appended pieces are kept."""
         if self._handle is not None:
             handle, self._handle = self._handle, None
             os.close(handle)

@@ -1,4 +1,4 @@
-"""`Journal`: an append-only file of checked records that survives a kill, a full disk and a pulled plug."""
+"""`Journal`: an append-only file of records with checksums that survives a kill, a full disk and a power failure."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from smartshoe.files.journal._records import LONGEST_PAYLOAD, OPENING, Record, p
 
 @dataclass(frozen=True)
 class Contents:
-    """What a journal holds: its whole records, in order.
+    """The content of a journal: its complete records, in order.
 
-    ``torn_bytes`` at the end belong to a record that was being written when the writer stopped (nobody had learnt of
-    it). ``damage`` are spans (start, stop) in bytes between whole records: a fault of the disk.
+    ``torn_bytes`` at the end belong to a record that was being written when the writer stopped (and was not yet
+    confirmed). ``damage`` are spans (start, stop) in bytes between complete records: a fault of the disk.
     """
 
     records: tuple[Record, ...]
@@ -27,7 +27,7 @@ class Contents:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A sentence for everything that is not as it was written."""
+        """One sentence for everything that differs from what was written."""
         said = [f"{stop - start} bytes from byte {start} on are damaged and left out" for start, stop in self.damage]
         if self.torn_bytes:
             said.append(f"a record of {self.torn_bytes} bytes was cut short when the writer stopped and is left out")
@@ -35,11 +35,11 @@ class Contents:
 
 
 def read_journal(path: Path | str) -> Contents:
-    """The journal's whole records; raises `InputError` where it cannot be read, `FormatError` where it is none."""
+    """The journal's complete records; raises `InputError` if it cannot be read, `FormatError` if it is no journal."""
     path = Path(path)
     data = read_bytes(path)
     if len(data) < len(OPENING) and OPENING.startswith(data):
-        return Contents((), len(data))  # stopped while the file was being made
+        return Contents((), len(data))  # the writer stopped while it created the file
     if not data.startswith(OPENING):
         raise FormatError(f"{path} is no journal (it begins with {data[:8]!r}): give one that a session wrote")
     records, damage = scan(data)
@@ -53,8 +53,8 @@ def read_journal(path: Path | str) -> Contents:
 class Journal:
     """A journal to append to; one writer at a time.
 
-    Opening one that is there recovers it first: what follows the last whole record is cut off, everything before
-    it stays. ``recovered`` is what it held.
+    Opening an existing one recovers it first: anything after the last complete record is cut off, everything before it
+    is kept. ``recovered`` is its content.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -72,13 +72,13 @@ class Journal:
             raise
 
     def clear(self) -> None:
-        """Forget every record that was recovered: a journal that begins anew."""
+        """Delete every recovered record and start the journal anew."""
         self._file.cut(0)
         self._file.append(OPENING)
         self.recovered = Contents((), 0)
 
     def append(self, kind: int, payload: bytes, *, synced: bool = True) -> None:
-        """Append a record; when this returns it is on disk (``synced`` False: a kill spares it, a pulled plug may not).
+        """Append a record; it is on disk on return (``synced`` False: it survives a kill, but not a power failure).
 
         Raises `InputError` where the disk is full.
         """

@@ -28,7 +28,7 @@ LONGEST_PAYLOAD = 1 << 28
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A record as it was appended; ``end`` is the byte after it in its file."""
+    """A record as appended; ``end`` is the position of the byte after it in its file."""
 
     kind: int
     payload: bytes
@@ -36,13 +36,13 @@ class Record:
 
 
 def packed(kind: int, payload: bytes) -> bytes:
-    """The record's bytes."""
+    """The record's encoded bytes."""
     checked = struct.pack("<BBI", kind, 0, len(payload))
     return _HEAD.pack(MARKER, kind, 0, len(payload), zlib.crc32(payload, zlib.crc32(checked))) + payload
 
 
 def record_at(data: bytes | memoryview, start: int) -> Record | None:
-    """The whole, intact record that begins at byte ``start``, or None."""
+    """The complete, intact record that begins at byte ``start``, or None."""
     if len(data) - start < _HEAD.size:
         return None
     marker, kind, zero, length, crc = _HEAD.unpack_from(data, start)
@@ -56,7 +56,7 @@ def record_at(data: bytes | memoryview, start: int) -> Record | None:
 
 
 def scan(data: bytes) -> tuple[list[Record], list[tuple[int, int]]]:
-    """Every intact record of a journal's bytes, and the spans (start, stop) between them that are none."""
+    """Every intact record of a journal's bytes, and the spans (start, stop) between them that hold none."""
     records: list[Record] = []
     damage: list[tuple[int, int]] = []
     at = len(OPENING)

@@ -1,4 +1,7 @@
-"""Vendor files to `Recording` and back: `read` and `write` for every format, known by content first, suffix second."""
+"""Converts vendors' files to `Recording` and back: `read` and `write`.
+
+Formats are recognised by content, then suffix.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ def _head(path: Path) -> bytes:
 def detect(path: Path | str) -> Format:
     """The format of the file at ``path``.
 
-    Raises `InputError` where it cannot be read, `FormatError` where no format fits.
+    Raises `InputError` where it cannot be read, `FormatError` where it is in no known format.
     """
     path = Path(path)
     head = _head(path)
@@ -39,7 +42,7 @@ def detect(path: Path | str) -> Format:
         if format_.sniff(path, head):
             return format_
     for format_ in formats():
-        # A text suffix on a file that is no text says nothing; others give a reader that can name the fault.
+        # A text suffix on a binary file is meaningless; other suffixes select a reader that can report the fault.
         if path.suffix.casefold() in format_.suffixes and not format_.is_text:
             return format_
     raise FormatError(
@@ -48,9 +51,9 @@ def detect(path: Path | str) -> Format:
 
 
 def read_sheet(path: Path | str) -> Sheet:
-    """The columns of any readable file as they stand in it; raises `InputError` and its kin.
+    """The columns of any readable file as they are in it; raises `InputError` and its subclasses.
 
-    The one place where a format's reader runs, ours or another's: whatever goes wrong in it becomes one sentence.
+    All formats' readers, our own and others', run here, so that any failure becomes one sentence.
     """
     if not isinstance(path, (str, os.PathLike)):
         raise UsageError(f"path is of type {type(path).__name__}: give the name of a file")
@@ -77,15 +80,15 @@ def read(
     Parameters
     ----------
     path
-        The file, in any of the formats; its content says which, before its suffix does.
+        The file, in any of the formats; recognised by its content, then by its suffix.
     time, force, sensors
-        Columns, where names and units do not tell: ``NAME``, ``NAME[unit]`` or, by 1-based number, ``3`` and
+        Columns, where names and units are ambiguous: ``NAME``, ``NAME[unit]`` or, by 1-based number, ``3`` and
         ``3[bar]``; the time also ``rows[49Hz]``, or ``NAME[49Hz]`` for a column that counts samples at that rate. A
         reference that is a pressure is taken for the force on 1 cm².
     unit, name
-        The sensing unit (``left_toe``) and the recording's name, in place of what the file says.
+        The sensing unit (``left_toe``) and the recording's name, instead of those in the file.
     partly
-        The file is one of two logs: choices that name no column of it are passed over.
+        The file is one of two logs: choices that name none of its columns are ignored.
 
     Raises
     ------
@@ -113,7 +116,7 @@ def write(recording: Recording, path: Path | str) -> None:
     Parameters
     ----------
     recording
-        What is written; numbers as they are, with their units in the columns' names.
+        The recording; numbers are written unchanged, with their units in the columns' names.
     path
         ``.csv`` and ``.txt`` are the plain table.
 

@@ -1,4 +1,4 @@
-"""Numbers below a header, as insoles' and motion laboratories' programs export them."""
+"""Reads numbers below a header, as exported by programs of insoles and motion laboratories."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ EMPTY = frozenset({"", "-"})
 
 
 def lines_of(path: Path) -> list[str]:
-    """The file's lines, the empty ones at its end left out."""
+    """The file's lines without empty ones at its end."""
     data = path.read_bytes()
     lines = data.decode(encoding_of(data)[0]).splitlines()
     while lines and not lines[-1].strip():
@@ -23,9 +23,10 @@ def lines_of(path: Path) -> list[str]:
 
 
 def numbers_below(path: Path, lines: list[str], first: int, columns: int, separator: str | None) -> Array:
-    """(rows, columns) from the 0-based line ``first`` on, NaN where a cell is empty; None separates by white space.
+    """Numbers (rows, columns) from the 0-based line ``first`` on; NaN where a cell is empty.
 
-    Raises `FormatError` with the line of a row that is too short or holds no number.
+    A ``separator`` of None is white space. Raises `FormatError` with the line of a row that is too short or has a cell
+    that is no number.
     """
     table = np.full((max(len(lines) - first, 0), columns), np.nan)
     if not len(table):

@@ -1,4 +1,4 @@
-"""Dates and times of day in cells: ISO 8601 (2026-05-01T10:00:00.25, with a zone or without) and 10:00:00.25."""
+"""Reads dates and times of day in cells: ISO 8601 (2026-05-01T10:00:00.25, with or without a zone) and 10:00:00.25."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def is_moment(cell: str) -> bool:
 
 
 def seconds_of(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array:
-    """(n,) seconds since the first cell, NaN where a cell is empty, to a nanosecond.
+    """Seconds (n,) since the first cell, to a nanosecond; NaN where a cell is empty.
 
-    Raises `FormatError` with the line of a cell that is no moment of the first one's kind, or no moment at all.
+    Raises `FormatError` with the line of a cell that is not a moment of the same kind as the first one.
     """
     import pandas as pd
 
@@ -46,5 +46,5 @@ def seconds_of(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]
             ticks = pd.to_datetime(texts, format="ISO8601", utc=has_zone[0]).to_numpy(dtype="datetime64[ns]")
     except ValueError as error:
         raise FormatError(f"{path}: column {name} holds no such time ({error}): correct it") from error
-    since = np.asarray(ticks).astype(np.int64)  # nanoseconds; what is missing is the least integer
+    since = np.asarray(ticks).astype(np.int64)  # nanoseconds; missing ones become the smallest integer
     return np.where(np.isnat(ticks), np.nan, (since - since[0]) / 1e9)

@@ -1,4 +1,4 @@
-"""Cells to numbers: the decimal mark is decided from every cell of a file, or the file is refused."""
+"""Converts cells to numbers: the decimal mark is decided from all cells of a file, or the file is refused."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PLAIN_NUMBERS = re.compile(r"[0-9eE+\-., \n]*", re.ASCII)
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number in some notation; a missing one is not."""
+    """Whether a cell is a number in any notation; a missing one is not."""
     return bool(
         _INTEGER.fullmatch(cell)
         or _ONE_MARK.fullmatch(cell)
@@ -40,7 +40,7 @@ def is_number(cell: str) -> bool:
 
 
 def split_unit(cell: str) -> tuple[str, str]:
-    """A cell's number and unit, as of ``12.3 N``; ('', '') where it is no number with a unit that is known."""
+    """A cell's number and unit, for example of ``12.3 N``; ('', '') where it is not a number with a known unit."""
     match = _WITH_UNIT.fullmatch(cell)
     if match and is_number(match[1]) and find_unit(match[2]) is not None:
         return match[1], match[2]
@@ -48,13 +48,13 @@ def split_unit(cell: str) -> tuple[str, str]:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether a cell says that there is no sample."""
+    """Whether a cell marks a missing sample."""
     return cell.casefold() in MISSING
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The columns of a table as numbers (NaN where missing), and what was done to read them."""
+    """The columns of a table as numbers (NaN where missing), and notes on how they were read."""
 
     columns: list[Array]
     decimal: str
@@ -71,7 +71,7 @@ class _NumberTable:
         self.joined = ["\n".join(column) for column in self.cells]
 
     def first(self, wanted: re.Pattern[str], limit: int = 3) -> list[int]:
-        """Lines (at most ``limit``) of the cells that ``wanted`` matches whole."""
+        """Lines (at most ``limit``) of the cells that ``wanted`` matches entirely."""
         found: set[int] = set()
         for column in self.cells:
             count = 0
@@ -84,7 +84,7 @@ class _NumberTable:
         return sorted(found)[:limit]
 
     def decimal(self) -> str:
-        """The one decimal mark of the file; raises `FormatError` where cells contradict each other."""
+        """The file's only decimal mark; raises `FormatError` where cells contradict each other."""
         if not any("," in text for text in self.joined):
             return "."
         if not any("." in text for text in self.joined):
@@ -108,7 +108,7 @@ class _NumberTable:
                 f"{self.path}: thousands and decimal marks cannot be told apart in {_lines(lines)}:"
                 " export the file again without thousands marks"
             )
-        return "."  # only text cells hold both marks; the conversion names them
+        return "."  # only text cells contain both marks; the conversion reports them
 
     def _refuse_ambiguous_commas(self) -> None:
         alike: set[int] = set()
@@ -125,7 +125,7 @@ class _NumberTable:
             )
 
     def convert(self, index: int, decimal: str, notes: list[str]) -> Array:
-        """Column ``index`` as numbers; raises `FormatError` naming the line of a cell that is none."""
+        """Column ``index`` as numbers; raises `FormatError` naming the line of a cell that is not one."""
         cells: Sequence[str] = self.cells[index]
         text = self.joined[index]
         if _PLAIN_NUMBERS.fullmatch(text):
@@ -183,10 +183,10 @@ class _NumberTable:
 def without_units(
     path: Path, name: str, unit: str, cells: Sequence[str], lines: Sequence[int]
 ) -> tuple[Sequence[str], str]:
-    """A column's ``cells`` (n,), which stand on ``lines`` (n,), without the unit that all carry, and the column's unit.
+    """A column's ``cells`` (n,) on ``lines`` (n,) with the unit that all of them carry removed, and the column's unit.
 
-    Missing cells carry none. Raises `FormatError` with the line of the first cell whose unit is not that of the cells
-    above it, or not that of the header, whose text is ``unit`` ('' where it gives none).
+    Missing cells carry none. Raises `FormatError` with the line of the first cell whose unit differs from that of the
+    cells above it, or from that of the header, whose text is ``unit`` ('' where it gives none).
     """
     first = next((cell for cell in cells if not is_missing(cell)), "")
     said = split_unit(first)[1]
@@ -210,9 +210,9 @@ def without_units(
 
 
 def numbers_of(path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> Numbers:
-    """The cells ``rows`` (n rows of one cell per name), which stand on ``lines`` (n,), as columns of numbers.
+    """The cells ``rows`` (n rows of one cell per name), found on ``lines`` (n,), as columns of numbers.
 
-    Raises as `numbers_of_columns` does.
+    Raises the errors of `numbers_of_columns`.
     """
     return numbers_of_columns(path, names, list(zip(*rows, strict=True)), lines)
 
@@ -220,10 +220,10 @@ def numbers_of(path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], 
 def numbers_of_columns(
     path: Path, names: Sequence[str], cells: Sequence[Sequence[str]], lines: Sequence[int]
 ) -> Numbers:
-    """The cells of columns, (n,) each and one a name, which stand on ``lines`` (n,), as numbers.
+    """The cells of columns, (n,) each and one per name, found on ``lines`` (n,), as numbers.
 
-    One decimal mark holds for the whole file. Raises `FormatError` naming the lines where cells contradict each
-    other, and the line and column of a cell that is no number.
+    The whole file has one decimal mark. Raises `FormatError` naming the lines where cells contradict each other, and
+    line and column of a cell that is not a number.
     """
     table = _NumberTable(path, names, cells, lines)
     decimal = table.decimal()

@@ -1,4 +1,4 @@
-"""`Sheet`: what a format's reader hands over before anyone has said which column is load and which is a sensor."""
+"""`Sheet`: the result of a format's reader, before it is decided which column is load and which is a sensor."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns, require_values
 from smartshoe.recording import Recording, Role
 
-LARGEST = 1e30  # in any unit: beyond it are broken files, and numbers that overflow when they are squared twice
+LARGEST = 1e30  # in any unit: larger numbers come from broken files, and overflow when squared twice
 
 
 @dataclass(eq=False)
 class Column:
-    """One column as it stands in the file: ``name`` and ``unit`` are the file's texts ('' where it gives none).
+    """One column of the file: ``name`` and ``unit`` are the file's texts ('' where it gives none).
 
-    ``values`` (n,) hold NaN where a cell is empty. ``role`` is set only by formats that store roles (our own HDF5
-    and MAT files); elsewhere the role follows from name and unit, or by the user. ``label`` is the header's whole
-    text where that is more than the name (``force_n``, ``Time[s]``): a user may choose the column by either.
+    ``values`` (n,) are NaN where a cell is empty. ``role`` is set only by formats that store roles (our own HDF5 and
+    MAT files); otherwise the role follows from name and unit, or from the user. ``label`` is the header's entire text
+    where that is more than the name (``force_n``, ``Time[s]``): a user may choose the column by either.
     """
 
     name: str
@@ -36,11 +36,11 @@ class Column:
 
 @dataclass(eq=False)
 class Sheet:
-    """A file's columns with what it says of itself.
+    """A file's columns and the information that it gives about itself.
 
-    ``first_line`` is the 1-based line of the first data row (text formats), for messages that name a line.
-    ``lines`` (n,) gives every row's line instead where rows do not stand on consecutive lines. ``has_header`` is
-    False for bare numbers, whose columns are then called '1', '2', ...
+    ``first_line`` is the 1-based line of the first data row (text formats), for messages that name a line. ``lines``
+    (n,) gives every row's line instead where rows are not on consecutive lines. ``has_header`` is False for bare
+    numbers, whose columns are then called '1', '2', ...
     """
 
     path: Path
@@ -55,7 +55,7 @@ class Sheet:
     lines: Index | None = None
 
     def place(self, row: int) -> str:
-        """Where the 0-based ``row`` stands in the file, as an error message names it."""
+        """The place of the 0-based ``row`` in the file, as an error message names it."""
         if self.lines is not None:
             return f"{self.path}, line {int(self.lines[row])}"
         if self.first_line is not None:
@@ -67,10 +67,10 @@ class Sheet:
 class Format:
     """A file format: how it is recognised, read and written.
 
-    ``title`` is what a person calls it ("NI TDMS file"). ``sniff(path, head)`` says whether the first bytes ``head``
-    are of this format; ``read`` gives the `Sheet`, and whatever it raises becomes one sentence (`FormatError` and
-    `InputError` in its own words); ``write`` is None where the format is read only. Formats are ``asked`` in that
-    order: 0 has an unmistakable beginning, 9 takes any text. ``is_text`` says that a binary file is none of it.
+    ``title`` is its name for users ("NI TDMS file"). ``sniff(path, head)`` tells whether the first bytes ``head`` are
+    of this format. ``read`` gives the `Sheet`; any exception becomes one sentence (`FormatError` and `InputError` keep
+    their own words). ``write`` is None where the format is read only. Formats are tried in the order of ``asked``: 0
+    has an unmistakable beginning, 9 accepts any text. ``is_text`` excludes binary files.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Format:
 
 
 def printable(text: str) -> str:
-    """``text`` with blanks for what breaks a line, and an escape for what else a terminal would obey."""
+    """``text`` with blanks for line breaks, and escapes for other characters that a terminal would interpret."""
     if text.isprintable():
         return text
     return "".join(
@@ -93,10 +93,10 @@ def printable(text: str) -> str:
 
 
 def require_sound(sheet: Sheet) -> None:
-    """Raise `FormatError` or `InputError` where a reader's sheet is not what `Sheet` promises.
+    """Raise `FormatError` or `InputError` where a reader's sheet violates the contract of `Sheet`.
 
-    A file may store anything where names, units, roles and numbers belong, and a reader may come from elsewhere. Its
-    texts are printable from here on: they go to terminals.
+    A file may contain anything in place of names, units, roles and numbers, and a reader may be another package's.
+    Afterwards its texts are printable, since they are shown on terminals.
     """
     require_columns(sheet.path, len(sheet.columns))
     require_values(sheet.path, sum(np.size(column.values) for column in sheet.columns))

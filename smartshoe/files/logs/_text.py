@@ -31,15 +31,15 @@ def is_text(head: bytes) -> bool:
 
 
 def _is_gb2312(run: bytes) -> bool:
-    # Every everyday Chinese character and symbol is a pair of bytes A1..F7, A1..FE; Latin letters with accents in
-    # cp1250 stand between ASCII letters, so that runs of odd length and low second bytes give them away.
+    # Every common Chinese character and symbol is a pair of bytes A1..F7, A1..FE. Latin letters with accents in
+    # cp1250 lie between ASCII letters, which shows in runs of odd length and low second bytes.
     return len(run) % 2 == 0 and all(
         0xA1 <= a <= 0xF7 and 0xA1 <= b <= 0xFE for a, b in zip(run[::2], run[1::2], strict=True)
     )
 
 
 def encoding_of(data: bytes) -> tuple[str, str | None]:
-    """The encoding of ``data`` and, where it was chosen by plausibility, a sentence that says so."""
+    """The encoding of ``data`` and, where it was chosen by plausibility, a sentence about that."""
     for mark, encoding in _BOMS:
         if data.startswith(mark):
             return encoding, None
@@ -64,9 +64,9 @@ def encoding_of(data: bytes) -> tuple[str, str | None]:
 
 
 def read_lines(path: Path) -> tuple[list[str], list[str]]:
-    """The lines of the text file at ``path`` without their ends, and notes on its encoding.
+    """The lines of the text file at ``path`` without line ends, and notes on its encoding.
 
-    Raises `InputError` where it cannot be read, `FormatError` where it is no text.
+    Raises `InputError` where it cannot be read, `FormatError` where it is not text.
     """
     try:
         data = path.read_bytes()
@@ -85,7 +85,7 @@ def read_lines(path: Path) -> tuple[list[str], list[str]]:
 
 
 def head_lines(head: bytes) -> list[str]:
-    """The whole lines in the first bytes ``head`` of a text file; an unknown encoding yields none."""
+    """The complete lines in the first bytes ``head`` of a text file; none for an unknown encoding."""
     try:
         encoding, _ = encoding_of(head[: head.rfind(b"\n") + 1] if b"\x00" not in head else head)
         text = head.decode(encoding, errors="replace")
@@ -99,7 +99,7 @@ def split_cells(lines: Sequence[str], delimiter: str | None) -> list[list[str]]:
     if delimiter is None:
         return [line.split() for line in lines]
     if any('"' in line for line in lines):
-        # A quote that never closes would swallow the lines below it; such lines are read one by one.
+        # An unclosed quote would absorb the lines below it; such lines are read one by one.
         whole = all(line.count('"') % 2 == 0 for line in lines)
         rows = csv.reader(lines, delimiter=delimiter) if whole else (
             next(csv.reader([line], delimiter=delimiter), []) for line in lines
@@ -109,7 +109,10 @@ def split_cells(lines: Sequence[str], delimiter: str | None) -> list[list[str]]:
 
 
 def even_rows(path: Path, rows: list[list[str]], lines: Sequence[int], width: int) -> list[list[str]]:
-    """``rows`` cut to ``width`` cells; raises `FormatError` where a row has fewer, or more that are not empty."""
+    """``rows`` cut to ``width`` cells.
+
+    Raises `FormatError` where a row has fewer, or further cells that are not empty.
+    """
     even: list[list[str]] = []
     for row, line in zip(rows, lines, strict=True):
         if len(row) < width or any(row[width:]):
@@ -121,7 +124,7 @@ def even_rows(path: Path, rows: list[list[str]], lines: Sequence[int], width: in
 
 
 def bracketed(title: str) -> tuple[str, str]:
-    """A title as name and unit's text: ``Time[s]``, ``Force (N)``, ``Force, N``; the whole title and '' without one."""
+    """A title as name and unit's text: ``Time[s]``, ``Force (N)``, ``Force, N``; without a unit the title and ''."""
     match = _BRACKETED.fullmatch(title)
     if match and match[1]:
         return match[1], match[2].strip()
@@ -130,9 +133,9 @@ def bracketed(title: str) -> tuple[str, str]:
 
 
 def plain_title(title: str) -> tuple[str, str]:
-    """A plain table's title as name and unit's symbol: ``force_n``, or with a unit that is known as `bracketed` has it.
+    """A plain table's title as name and unit's symbol: ``force_n``, or with a known unit in the form of `bracketed`.
 
-    A number in brackets counts columns; what else stands there is of the name, which is the user's own.
+    A number in brackets is part of the name, and so is any other text there, since the name is the user's own.
     """
     name, unit = split_column(title)
     if unit is None:

@@ -1,4 +1,4 @@
-"""The time of a sheet's rows: which column it is, in what unit, and that it increases."""
+"""The time of a sheet's rows: finds its column and unit, and checks that it increases."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from smartshoe.units import SECOND, Unit
 _TIME_NAMES = frozenset({"time", "t", "x_value", "zeit", "czas", "temps", "tijd", "tiempo", "时间"})
 
 
-# 'rows[49Hz]': the rows came at that rate; 'NAME[49Hz]': the column counts samples that did.
+# 'rows[49Hz]': the rows have that rate; 'NAME[49Hz]': the column counts samples of that rate.
 _AT_A_RATE = re.compile(r"(?P<base>.*?)\s*\[\s*(?P<rate>\d+(\.\d*)?([eE]\d+)?)\s*(?P<kilo>k?)hz\s*\]\s*", re.IGNORECASE)
 _ROWS = frozenset({"rows", ""})
 
 
 def time_of(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> tuple[int | None, Array]:
-    """The index of the time column, None where the rows themselves are the time, and the time (n,) in s.
+    """The index of the time column (None where the rows themselves are the time), and the time (n,) in s.
 
-    ``choice`` is a column by name or number with its unit, ``rows[49Hz]`` for rows at that rate, or ``NAME[49Hz]``
-    for a column that counts samples. Raises `InputError` and its kin for a column that is no time.
+    ``choice`` is a column by name or number with its unit, ``rows[49Hz]`` for rows at that rate, or ``NAME[49Hz]`` for
+    a column that counts samples. Raises `InputError` and its subclasses for a column that is not a time.
     """
     at_rate = _AT_A_RATE.fullmatch(choice) if choice is not None else None
     if at_rate is None:
@@ -43,7 +43,7 @@ def time_of(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> t
 
 
 def counts_rows(choice: str) -> bool:
-    """Whether a user's choice of time is the rows themselves, at a rate, and no column."""
+    """Whether a user's choice of time is the row number at a given rate rather than a column."""
     at_rate = _AT_A_RATE.fullmatch(choice)
     return at_rate is not None and at_rate["base"].casefold() in _ROWS
 
@@ -59,7 +59,7 @@ def _time_column(sheet: Sheet, units: Sequence[Unit | None], choice: str | None)
     for index, column in enumerate(sheet.columns):
         if units[index] is None and (column.name == "t" or column.name.casefold() in _TIME_NAMES - {"t"}):
             if sheet.format == "labview" and column.name.casefold() == "x_value":
-                return Pick(index, SECOND)  # LabVIEW's X_Dimension is time in seconds unless the file says more
+                return Pick(index, SECOND)  # LabVIEW's X_Dimension is time in seconds unless stated otherwise
             return Pick(index, None)
     example = "NAME[s]" if sheet.has_header else "1[ms]"
     raise InputError(
@@ -81,12 +81,12 @@ def _complete(sheet: Sheet, column: Column) -> Array:
 def _seconds(sheet: Sheet, column: Column, in_unit: Unit) -> Array:
     values = _complete(sheet, column)
     if in_unit.scale < 1.0:
-        return values / (1.0 / in_unit.scale)  # 11 ms is 0.011 s to the last bit; a product may miss it
+        return values / (1.0 / in_unit.scale)  # makes 11 ms equal 0.011 s to the last bit; a product may not
     return in_unit.to_si(values)
 
 
 def check_increasing(sheet: Sheet, time_s: Array) -> None:
-    """Raise `InputError` for the first row of the sheet whose time (n,) in s repeats or goes back."""
+    """Raise `InputError` for the first row of the sheet whose time (n,) in s repeats or decreases."""
     step = np.diff(time_s)
     if step.size and not (step > 0).all():
         at = int(np.argmax(~(step > 0)))
@@ -96,7 +96,7 @@ def check_increasing(sheet: Sheet, time_s: Array) -> None:
         if not more and at + 2 < time_s.size and step[at] < 0 and time_s[at + 2] < time_s[at]:
             which = "that row and those after it"  # the clock was set back
         by_rate = ""
-        if more and (step >= 0.0).all() and time_s[-1] > time_s[0]:  # of times that were rounded
+        if more and (step >= 0.0).all() and time_s[-1] > time_s[0]:  # typical of rounded times
             by_rate = f", or read all by their rate (--time 'rows[{step.size / (time_s[-1] - time_s[0]):.4g}Hz]')"
         raise InputError(
             f"{sheet.place(at + 1)}: time {fault} ({time_s[at]:.9g} s, then {time_s[at + 1]:.9g} s){where}: remove or"

@@ -1,4 +1,4 @@
-"""What the verbs take for a recording: a `Recording`, the path of a readable file, or a pandas DataFrame."""
+"""Accepts recordings in any form that public functions take: a `Recording`, a file's path, or a pandas DataFrame."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ RecordingLike: TypeAlias = Union[Recording, str, "os.PathLike[str]", "pd.DataFra
 def recording_of(given: Any, argument: str = "recording") -> Recording:
     """``given`` as a recording.
 
-    A path is read as `smartshoe.read` does, a DataFrame as a plain table with the same columns (``time_s`` may be its
-    index). Raises `UsageError` for anything else, naming ``argument`` and the type, and what reading raises.
+    A path is read as by `smartshoe.read`, a DataFrame as a plain table with the same columns (``time_s`` may be its
+    index). Raises `UsageError` for anything else, naming ``argument`` and the type, and the errors of reading.
     """
     if isinstance(given, Recording):
         return given
@@ -41,7 +41,7 @@ def recording_of(given: Any, argument: str = "recording") -> Recording:
 
 
 def recordings_of(given: Any, argument: str = "recordings") -> list[Recording]:
-    """One recording, or several in any iterable, as a list; raises as `recording_of` does."""
+    """One recording, or several in any iterable, as a list; raises the errors of `recording_of`."""
     several = isinstance(given, Iterable) and not isinstance(
         given, (Recording, str, bytes, os.PathLike, Mapping, np.ndarray)
     )
@@ -53,9 +53,10 @@ def recordings_of(given: Any, argument: str = "recordings") -> list[Recording]:
 def unit_of(
     recordings: Sequence[Recording], do: str, called: Callable[[Recording], str | None] = lambda one: one.unit
 ) -> str:
-    """What the one unit of ``recordings`` is ``called``, empty where none says so.
+    """The name of the one unit of ``recordings``, given by ``called``; empty where no recording states it.
 
-    Raises `UsageError` where there are several, with a recording of each: to ``do`` something is for one at a time.
+    Raises `UsageError`, naming a recording of each, where there are several units: the action ``do`` applies to one
+    unit at a time.
     """
     first_of = {unit: one.label for one in reversed(recordings) if (unit := called(one))}
     if len(first_of) > 1:
@@ -65,7 +66,7 @@ def unit_of(
 
 
 def _is_frame(given: Any) -> bool:
-    pandas = sys.modules.get("pandas")  # where nobody has imported it, nothing can be a DataFrame
+    pandas = sys.modules.get("pandas")  # if it has not been imported, nothing can be a DataFrame
     return pandas is not None and isinstance(given, pandas.DataFrame)
 
 

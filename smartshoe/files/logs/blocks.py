@@ -1,4 +1,4 @@
-"""A plain table too long for memory, block by block: `read_blocks`, with the columns and errors of `read`."""
+"""`read_blocks` reads a plain table too long for memory block by block, with the columns and errors of `read`."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from smartshoe.files.logs.formats import plain as table
 from smartshoe.files.logs.picks import unit_in_file
 from smartshoe.recording import Channel, Recording, split_column
 
-BLOCK_BYTES = 4 << 20  # of text; as numbers and while it is parsed some five times as much
+BLOCK_BYTES = 4 << 20  # of text; as numbers and during parsing about five times as much
 
 
 def read_blocks(path: Path | str, *, time: str | None = None, block_bytes: int = BLOCK_BYTES) -> Iterator[Recording]:
     """A recording as consecutive `Recording` blocks of ``block_bytes`` of text: a plain table in bounded memory.
 
     ``time`` chooses the time column as in `smartshoe.files.logs.read`. A column may be empty throughout a block. Other
-    formats than the plain table are read whole and come as one block, as does a time that counts rows. Raises
-    `InputError` and its kin, naming file and line, when the block at fault is reached.
+    formats than the plain table are read completely and yield one block, as does a time that counts rows. Raises
+    `InputError` and its subclasses, naming file and line, when the faulty block is reached.
     """
     path = Path(path)
     if detect(path).name != "plain" or (time is not None and time.startswith("rows[")):
@@ -58,7 +58,7 @@ def read_blocks(path: Path | str, *, time: str | None = None, block_bytes: int =
 
 
 def _texts(path: Path, header_line: int, block_bytes: int) -> Iterator[tuple[bytes, int]]:
-    """Whole lines of about ``block_bytes``, and the 1-based line of the first of them."""
+    """Complete lines of about ``block_bytes``, and the 1-based line of the first of them."""
     line = header_line + 1
     with path.open("rb") as file:
         for _ in range(header_line):
@@ -70,7 +70,7 @@ def _texts(path: Path, header_line: int, block_bytes: int) -> Iterator[tuple[byt
 
 
 def _numbers(path: Path, header: list[str], text: bytes, first_line: int) -> tuple[Array, Index | None]:
-    """The cells (rows, columns) of a block of lines, and the rows' lines where blank ones lie between."""
+    """The cells (rows, columns) of a block of lines, and the rows' lines where blank ones lie in between, else None."""
     import pandas as pd
 
     width = len(header)
@@ -85,7 +85,7 @@ def _numbers(path: Path, header: list[str], text: bytes, first_line: int) -> tup
         if len(values) == count and text.count(b",") == count * (width - 1):
             return values, None
     except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning, pd.errors.EmptyDataError):
-        pass  # the slow pass reads it, or says which cell is at fault
+        pass  # the slow pass reads it, or reports the faulty cell
     rows = [
         (number, [cell.strip() for cell in line.split(",")])
         for number, line in enumerate(text.decode("utf-8", errors="replace").splitlines(), start=first_line)
@@ -119,7 +119,7 @@ def _sheet(
 
 
 def _layout(sheet: Sheet, time: str | None) -> Recording:
-    """The channels by name, unit and role, as `read` would have them; a column that is empty so far is there."""
+    """The channels by name, unit and role, as in `read`; includes columns that are empty so far."""
     filled = [
         Column(c.name, c.unit, np.zeros_like(c.values), None, c.label) if not np.isfinite(c.values).any() else c
         for c in sheet.columns

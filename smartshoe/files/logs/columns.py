@@ -1,4 +1,4 @@
-"""A sheet's columns to a recording's channels: the one place where a column becomes time, load or sensor."""
+"""Turns a sheet's columns into a recording's channels: decides which column is time, load or sensor."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ from smartshoe.units import Unit, declared, on_one_cm2
 
 _COMMANDS = re.compile(r"command(ed)?|demand|set[ _-]?point|target|soll(wert)?", re.IGNORECASE)
 _ESTIMATE = re.compile(r"estimate", re.IGNORECASE)
-_MACHINE_LOGS = frozenset({"bluehill", "labview", "tdms"})  # what a testing machine or its logger writes
-_NEGATIVE_SHARE = 5.0  # a load that reaches this many times further below zero than above it is compression
+_MACHINE_LOGS = frozenset({"bluehill", "labview", "tdms"})  # formats of testing machines and their loggers
+_NEGATIVE_SHARE = 5.0  # a load that goes this many times further below zero than above is negated compression
 
 
 def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
-    """The roles that channels have by name and unit alone (the plain table's names first).
+    """The roles that follow from the channels' names and units alone (the plain table's names take precedence).
 
     A single channel in a unit of force is the load; names like ``command`` in a unit of force are commands. Named
-    sensors (``pressure``, ``left_toe``) are the sensors, but for neighbours of a ``pressure``; where there is none,
-    every channel in a unit of pressure.
+    sensors (``pressure``, ``left_toe``) are the sensors, except for neighbours of a ``pressure``; without named ones,
+    every channel in a unit of pressure is a sensor.
     """
     roles: list[Role] = ["auxiliary"] * len(names)
     forces: list[int] = []
@@ -57,7 +57,7 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
             roles[index] = "command"
         elif unit_ is not None and unit_.quantity == "force" and not _ESTIMATE.search(name):
             forces.append(index)
-    if SENSOR_NAME in names:  # the unit under test; a shoe's named sensors beside it are its neighbours
+    if SENSOR_NAME in names:  # the unit under test; other named sensors of the shoe are its neighbours
         roles = [
             "auxiliary" if role == "sensor" and name != SENSOR_NAME else role
             for name, role in zip(names, roles, strict=True)
@@ -75,7 +75,10 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
 def _rename(
     names: list[str], roles: Sequence[Role], units: Sequence[Unit], is_declared: Sequence[bool], has_header: bool
 ) -> None:
-    """Give load, command and a single pressure the plain table's names; a name ``is_declared`` by the file stays."""
+    """Give load, command and a single pressure the plain table's names.
+
+    Keep a name that ``is_declared`` by the file.
+    """
     sensors = [i for i, role in enumerate(roles) if role == "sensor"]
     for index, role in enumerate(roles):
         if is_declared[index]:
@@ -96,7 +99,7 @@ def _rename(
 
 
 def _unique(names: list[str]) -> list[str]:
-    # "time" is the time base's own: an old time column that was not chosen is a channel of another name.
+    # "time" is reserved for the time base: a time column that was not chosen gets another name.
     taken: set[str] = {TIME_NAME}
     counts: Counter[str] = Counter()
     for index, name in enumerate(names):
@@ -110,7 +113,7 @@ def _unique(names: list[str]) -> list[str]:
 
 
 def is_negative(load: Channel) -> bool:
-    """Whether the load goes far below zero and hardly above: compression, logged as negative."""
+    """Whether the load goes far below zero and hardly above it: compression that was logged as negative."""
     values = load.values[load.present]
     return bool(values.size and -values.min() > _NEGATIVE_SHARE * max(values.max(), 0.0))
 
@@ -139,7 +142,7 @@ def _channel(sheet: Sheet, name: str, column: Column, unit_: Unit, role: Role, n
 
 @dataclass(eq=False)
 class _Assignment:
-    """Which column is what: ``units`` and ``roles`` by column, ``chosen`` those that the user named."""
+    """The assignment of columns: ``units`` and ``roles`` by column, and the ``chosen`` ones that the user named."""
 
     sheet: Sheet
     units: list[Unit | None]
@@ -150,7 +153,7 @@ class _Assignment:
     is_pressed_all_over: bool = False
 
     def choose_load(self, force: str) -> None:
-        """The reference load is the column that the user names; a minus before it turns its sign."""
+        """Make the column that the user names the reference load; a minus before the name reverses its sign."""
         self.is_turned = force.startswith("-") and not names_a_column(self.sheet, force)
         force = force[1:] if self.is_turned else force
         found = pick(self.sheet, force, "--force")
@@ -169,7 +172,7 @@ class _Assignment:
         self._take(found.index, "load")
 
     def choose_sensors(self, sensors: Sequence[str], at_time: int | None) -> None:
-        """The readings are the columns that the user names, and no others."""
+        """Make the columns that the user names the readings, and no others."""
         self.roles = [None if role == "sensor" else role for role in self.roles]
         for choice in sensors:
             found = pick(self.sheet, choice, "--sensor")
@@ -192,7 +195,7 @@ class _Assignment:
         self.chosen.add(index)
 
     def tell_the_rest(self, columns: Sequence[int], *, sensors_chosen: bool) -> None:
-        """Roles of the columns that nobody named, by their own names and units."""
+        """Assign roles to the columns that the user did not name, by their names and units."""
         free = [index for index in columns if index not in self.chosen]
         guessed = roles_of([self.sheet.columns[i].name for i in free], [self.units[i] for i in free])
         for index, role in zip(free, guessed, strict=True):
@@ -206,7 +209,7 @@ class _Assignment:
                 self.notes.append(f"Column {column.name}, the only one beside the load, is the reading.")
 
     def names(self, columns: Sequence[int]) -> list[str]:
-        """The channels' names: the plain table's for load, command and reading, unless the file's own hold."""
+        """The channels' names: the plain table's for load, command and reading, unless the file's own are kept."""
         sheet = self.sheet
         names = [sheet.columns[index].name for index in columns]
         units = [self.units[index] or declared("") for index in columns]
@@ -215,7 +218,7 @@ class _Assignment:
             lengths = [at for at, unit_ in enumerate(units) if unit_.quantity == "length"]
             if lengths and roles[lengths[0]] == "auxiliary" and "displacement" not in names:
                 names[lengths[0]] = "displacement"
-        # A plain table's names are the user's own, and so are those in a file that stores roles.
+        # The names in a plain table, and in a file that stores roles, are the user's own.
         is_declared = [
             index not in self.chosen and (sheet.format == "plain" or sheet.columns[index].role is not None)
             for index in columns
@@ -224,7 +227,7 @@ class _Assignment:
         return _unique(names)
 
     def channels(self, columns: Sequence[int], names: Sequence[str]) -> dict[str, Channel]:
-        """The channels by name; a load that a machine logged negative is turned."""
+        """The channels by name; a load that a machine logged as negative is negated."""
         channels: dict[str, Channel] = {}
         for index, name in zip(columns, names, strict=True):
             column = self.sheet.columns[index]
@@ -238,7 +241,7 @@ class _Assignment:
         return channels
 
     def _signed(self, load: Channel, column: Column) -> Channel:
-        """The load with compression positive, as far as user or machine say that it is not."""
+        """The load with compression positive, negated where the user or the machine's format says so."""
         if self.is_turned:
             return _turned(load)
         if column.role is None and self.sheet.format in _MACHINE_LOGS and is_negative(load):
@@ -266,10 +269,10 @@ def recording_from(
     name: str | None = None,
     partly: bool = False,
 ) -> Recording:
-    """The recording that ``sheet`` holds; the choices are those of `smartshoe.files.logs.read`.
+    """The recording in ``sheet``; the choices are those of `smartshoe.files.logs.read`.
 
-    Raises `MissingChannelError` for a chosen column that is not there, `UnitError` for a unit of another quantity,
-    `InputError` for a unit that is missing, for no rows, and for time that repeats or goes back.
+    Raises `MissingChannelError` for a chosen column that does not exist, `UnitError` for a unit of another quantity,
+    `InputError` for a missing unit, for no rows, and for time that repeats or decreases.
     """
     if not sheet.columns or sheet.columns[0].values.size == 0:
         raise InputError(f"{sheet.path} holds no samples below its header: give a file with data rows")

@@ -1,4 +1,4 @@
-"""Which column of a sheet a user's words mean, and its unit."""
+"""Resolves a user's choice of a column of a sheet, and its unit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.files.logs._sheet import Column, Sheet
 from smartshoe.units import Unit, declared, find_unit
 
-# Of each option, for a person whose unit is not known.
+# Usual units of each option, for the message to a user whose unit is unknown.
 _USUAL = {"--time": "s, ms, us or min", "--force": "N, kN, kgf (kg), gf (of grams) or lbf"}
 LOADS = ("force", "pressure")  # quantities that a load may have
 _CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
@@ -22,11 +22,11 @@ class Pick:
     """A column by its ``index``, and the ``unit`` in which its values are."""
 
     index: int
-    unit: Unit | None  # what the user's brackets say, else what the file says
+    unit: Unit | None  # the user's, given in brackets, else the file's
 
 
 def unit_in_file(column: Column) -> Unit | None:
-    """The unit that the file gives the column, as declared where the table does not know it; None without one."""
+    """The unit that the file gives the column, even if the table of units lacks it; None without one."""
     text = column.unit.strip()
     if not text.strip("()[]{} "):
         return None
@@ -34,12 +34,12 @@ def unit_in_file(column: Column) -> Unit | None:
 
 
 def titles(sheet: Sheet) -> str:
-    """The sheet's columns as a person reads them."""
+    """The sheet's columns as one text for the user."""
     return first_names([column.label or column.name or "''" for column in sheet.columns])
 
 
 def _titled(columns: Sequence[Column], wanted: str) -> list[int]:
-    """The columns of that header text, or else of that name: exactly, or else apart from case."""
+    """Indices of the columns with that header text, else of that name; exact matches, else ignoring case."""
     for alike in (str, str.casefold):
         for titles in ([c.label for c in columns], [c.name for c in columns]):
             found = [i for i, title in enumerate(titles) if wanted and alike(title) == alike(wanted)]
@@ -49,7 +49,7 @@ def _titled(columns: Sequence[Column], wanted: str) -> list[int]:
 
 
 def names_a_column(sheet: Sheet, choice: str) -> bool:
-    """Whether a user's ``choice`` names a column of the sheet, by name or number; units are not looked at."""
+    """Whether a user's ``choice`` names a column of the sheet, by name or number; units are ignored."""
     bracket = _CHOICE.fullmatch(choice)
     bases = (choice.strip(), bracket["base"].strip()) if bracket else (choice.strip(),)
     return any(_titled(sheet.columns, base) or _numbered(sheet, base) for base in bases)
@@ -62,7 +62,7 @@ def _numbered(sheet: Sheet, base: str) -> list[int]:
 
 
 def pick(sheet: Sheet, choice: str, option: str) -> Pick:
-    """The column that a user's ``choice`` names; raises `InputError` where none or several fit."""
+    """The column that a user's ``choice`` names; raises `InputError` where none or several match."""
     columns = sheet.columns
     bracket = _CHOICE.fullmatch(choice)
     base, said = choice.strip(), None
@@ -87,7 +87,7 @@ def pick(sheet: Sheet, choice: str, option: str) -> Pick:
 
 
 def _said_unit(sheet: Sheet, text: str, choice: str, option: str) -> Unit:
-    """The unit that a user's brackets say; of a sensor any, as in a header: its gain is identified, not assumed."""
+    """The unit in a user's brackets; for a sensor it may be any, as in a header, since its gain is identified."""
     found = find_unit(text)
     if found is None and option == "--sensor" and text.strip():
         found = declared(text.strip())
@@ -105,13 +105,13 @@ def _said_unit(sheet: Sheet, text: str, choice: str, option: str) -> Unit:
 
 
 def _weight_of(text: str, option: str) -> Unit | None:
-    """Of a load the unit of force that a mass weighs whose unit is ``text``: gf for g; None where it is no mass."""
+    """The unit of force that corresponds to a mass unit given for a load (gf for g); None for other units."""
     weight = find_unit(f"{text.strip()}f") if option == "--force" else None
     return weight if weight is not None and weight.quantity == "force" else None
 
 
 def _usual(option: str) -> str:
-    """Units of what an option names, for a person whose own is not known."""
+    """The usual units of an option, for the message to a user whose unit is unknown."""
     return _USUAL.get(option, "mbar, V, ohm or mm, and counts for bare numbers")
 
 
@@ -128,15 +128,15 @@ def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:
 
 
 def stands_for_a_load(of_file: Unit, said: Unit, option: str) -> bool:
-    """Whether brackets say of what is no load, as a way, that its numbers stand in the load's place."""
+    """Whether the user's unit makes a column of another quantity, such as a displacement, serve as the load."""
     return option == "--force" and said.quantity in LOADS and of_file.quantity not in (*LOADS, "unknown")
 
 
 def need_unit(sheet: Sheet, found: Pick, option: str, example: str) -> Unit:
-    """The pick's unit; raises `InputError` where neither file nor user gives one."""
+    """The pick's unit; raises `InputError` where neither file nor user gives it."""
     if found.unit is None:
         name, known, also = sheet.columns[found.index].name, "", ""
-        if option == "--sensor":  # its unit may be any, also the ending of its name or the name itself
+        if option == "--sensor":  # its unit may be any, even the suffix of its name or the name itself
             itself, ending = find_unit(name), name.rpartition("_")[2]
             example = example if itself is None else itself.symbol
             if ending not in ("", name):
@@ -149,7 +149,7 @@ def need_unit(sheet: Sheet, found: Pick, option: str, example: str) -> Unit:
 
 
 def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example: str) -> Unit:
-    """The pick's unit; raises `UnitError` where it is of another ``quantity``, and as `need_unit` does."""
+    """The pick's unit; raises `UnitError` where it is not of ``quantity``, and the errors of `need_unit`."""
     in_unit = need_unit(sheet, found, option, example)
     if in_unit.quantity != quantity:
         also, weight = "", _weight_of(in_unit.symbol, option)
@@ -157,7 +157,7 @@ def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example
             also = f", or write '[{weight.symbol}]' behind its name for what such a mass weighs"
         elif in_unit.quantity == "unknown":
             also = f", or say in brackets what it is in ({_usual(option)})"
-        if quantity == "force" and in_unit.quantity == "length":  # a unit that is stretched is diagnosed as any other
+        if quantity == "force" and in_unit.quantity == "length":  # a stretched unit is diagnosed like any other
             also = f", or write '[{example}]' behind its name to use its numbers in the load's place"
         raise UnitError(
             f"{sheet.path}: column {sheet.columns[found.index].name!r} for {option} is in {in_unit.symbol}, which is"

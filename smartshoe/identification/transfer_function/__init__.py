@@ -1,4 +1,4 @@
-"""Continuous-time transfer functions of any order from sampled input and output."""
+"""Identifies continuous-time transfer functions of any order from sampled input and output."""
 
 from smartshoe.identification.transfer_function._estimate import Root, TransferFunctionEstimate
 from smartshoe.identification.transfer_function._identify import identify_transfer_function

@@ -10,20 +10,20 @@ from smartshoe.identification.transfer_function._discrete import prefilter
 from smartshoe.identification.transfer_function._problem import OutputError
 
 MOST_SAMPLES = 500
-MOST_SHARE = 0.25  # of the shortest experiment
+MOST_SHARE = 0.25  # of the shortest experiment's duration
 UNEVEN_POINTS = 40
-CANDIDATES = 3  # from each prefilter
-MARGIN = 1e-8  # of a step, by which a cell's lower end lies above the whole sample
+CANDIDATES = 3  # delays from each prefilter
+MARGIN = 1e-8  # steps by which a cell's lower end lies above the whole sample
 
 
 def longest_delay_s(problem: OutputError) -> float:
-    """The largest delay looked for where the user names none."""
+    """The largest delay in s that is searched where the user gives none."""
     shortest = min(problem.experiments, key=lambda experiment: float(experiment.time_s[-1]))
     return min(MOST_SHARE * float(shortest.time_s[-1]), MOST_SAMPLES * shortest.typical_step_s)
 
 
 def common_step_s(problem: OutputError) -> float | None:
-    """The even step that all experiments share, None where they share none."""
+    """The even step in s shared by all experiments, or None."""
     step = problem.experiments[0].step_s
     return step if all(experiment.step_s == step for experiment in problem.experiments) else None
 
@@ -37,10 +37,10 @@ def delay_grid(problem: OutputError, most_delay_s: float) -> Array:
 
 
 def screen(problem: OutputError, prefilter_rad_s: float, grid: Array) -> Array:
-    """Equation error behind the state-variable filter at each delay of ``grid`` (n,), on every sample.
+    """Equation error behind the state-variable filter at each delay of ``grid`` (n,), over all samples.
 
-    A delay by whole samples is a shift of filtered signals. Before a record the input was 0 at rest, else its first
-    value stands for it, and the free response for what that leaves.
+    A delay by whole samples is a shift of filtered signals. Before a record the input is taken as 0 (start at rest), or
+    else as its first value, with the free response for the difference.
     """
     n = problem.poles
     chain = prefilter(n, prefilter_rad_s)
@@ -81,7 +81,7 @@ def screen(problem: OutputError, prefilter_rad_s: float, grid: Array) -> Array:
 
 
 def _left(normal: Array) -> float:
-    """Sum of squares of the first column that the others leave, from their normal matrix."""
+    """Sum of squares of the first column that the others do not explain, from their normal matrix."""
     norm = np.sqrt(np.diag(normal))
     norm[norm == 0.0] = 1.0
     scaled = normal / np.outer(norm, norm)
@@ -101,7 +101,7 @@ def candidates(costs: Array) -> list[int]:
 def cells(problem: OutputError, at_s: float, step_s: float, most_s: float) -> list[tuple[float, float]]:
     """The intervals of delay around ``at_s`` within which the cost is smooth.
 
-    Where a held input jumps, so does the output's slope, and the cost has a kink at every whole sample, at which its
+    Where a held input jumps, so does the output's slope, and the cost has a kink at every whole sample, where its
     minimum may well lie. The gradient at a whole sample is that of the cell below it; hence the margin above.
     """
     if problem.hold == "foh" or common_step_s(problem) is None:
@@ -114,17 +114,17 @@ def cells(problem: OutputError, at_s: float, step_s: float, most_s: float) -> li
 
 
 def snapped(delay_s: float, low_s: float, high_s: float, step_s: float, near: float = MARGIN) -> float:
-    """``delay_s``, or the whole sample at the end of its cell where it ended within ``near`` steps of it."""
+    """``delay_s``, or the whole sample at the end of its cell where it is within ``near`` steps of it."""
     if delay_s <= low_s + near * step_s:
         return max(low_s - MARGIN * step_s, 0.0)
     return high_s if delay_s >= high_s - near * step_s else delay_s
 
 
 def traded_zeros(numerator: Array) -> list[tuple[Array, float]]:
-    """Numerators with one zero (or pair) mirrored in the imaginary axis, and the delay in s that makes up for it.
+    """Numerators with one zero (or pair) mirrored in the imaginary axis, and the delay in s that compensates for it.
 
-    (1 - s/z)/(1 + s/z) is nearly exp(-2 s/z) (Pade), so that a zero on the wrong side with a delay too short or long
-    fits almost as well as the truth: a minimum of its own, out of reach of any descent.
+    (1 - s/z)/(1 + s/z) is nearly exp(-2 s/z) (Pade), so that a zero on the wrong side with a delay too short or too
+    long fits almost as well as the truth. This is a separate local minimum, which no descent leaves.
     """
     roots = np.roots(numerator)
     traded = []
@@ -134,7 +134,7 @@ def traded_zeros(numerator: Array) -> list[tuple[Array, float]]:
         family = np.isclose(roots, root) | np.isclose(roots, root.conj())
         others = np.where(family, -roots.conj(), roots)
         mirrored = np.real(np.poly(others))
-        # The gain at s = 0 stays.
+        # The gain at s = 0 is preserved.
         mirrored *= numerator[-1] / mirrored[-1]
         traded.append(
             (np.asarray(mirrored, dtype=float), float(np.sum(2.0 * roots[family].real / np.abs(roots[family]) ** 2)))

@@ -1,7 +1,7 @@
 """1/A(s) and 1/A(s)^2 between samples, exactly: steps or straight lines, any delay, even or uneven steps.
 
 The chain is ``A(p) x = u``, ``A(p) w = x`` with p = d/dt; its states are x, w and their first n - 1 derivatives. From
-them everything follows without a numerical derivative: the model's output, its derivatives with respect to every
+them everything follows without numerical differentiation: the model's output, its derivatives with respect to every
 coefficient (`StateVariableFilter.numerator_map`, `StateVariableFilter.denominator_map`), and the filtered derivatives
 that SRIVC needs. The transition over a step is a block of the exponential of the system with its input as further
 states (Van Loan 1978).
@@ -19,12 +19,12 @@ import numpy as np
 from smartshoe.arrays import Array
 
 Intersample = Literal["zoh", "foh"]
-EVEN_DELAY = 1e-12  # of a step: a delay this near whole samples is whole
+EVEN_DELAY = 1e-12  # of a step: a delay this near whole samples is taken as whole
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """States (count, m), balanced, with the delayed input (count,) and its slope (count,) at the same times."""
+    """Balanced states (count, m), with the delayed input (count,) and its slope (count,) at the same times."""
 
     states: Array
     value: Array
@@ -35,8 +35,8 @@ class Trajectory:
 class StateVariableFilter:
     """The chain for ``denominator`` (n,), its coefficients without the leading 1, highest power first.
 
-    ``levels`` 2 has w and x, 1 only x. Balanced states times ``scale`` are w and its derivatives, then x and its
-    derivatives, lowest first. ``matrix`` carries the input and its slope as two last states.
+    With ``levels`` 2 the chain has w and x, with 1 only x. Balanced states times ``scale`` are w and its derivatives,
+    then x and its derivatives, lowest first. ``matrix`` includes the input and its slope as two further states.
     """
 
     denominator: Array
@@ -69,7 +69,7 @@ class StateVariableFilter:
 
     @property
     def size(self) -> int:
-        """How many states."""
+        """The number of states m."""
         return self.levels * self.order
 
     def transition(self, step_s: float) -> Array:
@@ -82,9 +82,10 @@ class StateVariableFilter:
         return known
 
     def taps(self, step_s: float, hold: Intersample, fraction: float) -> Array:
-        """Weights (3, m) of u[k - d - 1], u[k - d], u[k - d + 1] in the states at k + 1; delay (d + fraction) steps.
+        """Weights (3, m) of u[k - d - 1], u[k - d], u[k - d + 1] in the states at k + 1.
 
-        A fraction f splits the step where the delayed input changes: f of it belongs to the older sample.
+        The delay is d + fraction steps. A fraction f splits the step where the delayed input changes: the first f of it
+        belongs to the older sample.
         """
         m = self.size
         per_value, per_slope = 1.0 / self.input_scale[0], 1.0 / (self.input_scale[1] * step_s)
@@ -113,7 +114,7 @@ class StateVariableFilter:
         return state
 
     def steady(self, value: float) -> Array:
-        """Balanced states (m,) that a constant input has settled to; not finite where a pole is 0."""
+        """Balanced states (m,) in equilibrium with a constant input; not finite where a pole is 0."""
         n = self.order
         state = np.zeros(self.size)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -126,7 +127,7 @@ class StateVariableFilter:
     def derivatives_of_x(self) -> tuple[Array, Array]:
         """Rows (n + 2, m) that give x and its derivatives up to n + 1 from balanced states.
 
-        And what they take of the input (n + 2, 2): columns value and slope.
+        Also their coefficients (n + 2, 2) of the input's value and slope.
         """
         n, m = self.order, self.size
         rows, inputs = np.zeros((n + 2, m)), np.zeros((n + 2, 2))
@@ -160,7 +161,7 @@ class StateVariableFilter:
     def run_even(
         self, u: Array, first: int, count: int, start: Array, step_s: float, hold: Intersample, delay_s: float
     ) -> Trajectory:
-        """``count`` states from ``start`` at sample ``first`` on; beyond its ends, u keeps its end values."""
+        """``count`` states from ``start`` at sample ``first`` on; beyond its ends u keeps its end values."""
         from smartshoe.kernels.polynomial import run_even
 
         whole, fraction = split_delay(delay_s, step_s)
@@ -183,7 +184,10 @@ class StateVariableFilter:
     def run_uneven(
         self, u: Array, knots: Array, time_s: Array, start: Array, hold: Intersample, delay_s: float
     ) -> Trajectory:
-        """States at ``time_s`` (count,) from ``start`` at its first; ``u`` stands at ``knots``, delayed."""
+        """States at ``time_s`` (count,) from ``start`` at the first of them.
+
+        ``u`` is given at ``knots`` and delayed.
+        """
         from smartshoe.kernels.polynomial import run_uneven
 
         m, count = self.size, time_s.size
@@ -193,7 +197,7 @@ class StateVariableFilter:
         matrix[m, m + 1] = 1.0
         norm = float(np.linalg.norm(matrix[:m, :m], 1))
         out, value, slope = np.empty((count, m)), np.zeros(count), np.zeros(count)
-        # Sums of times and a delay that are equal on paper differ by their rounding.
+        # Sums of times and a delay that should be equal differ by rounding.
         slack = 1e-15 * float(np.max(np.abs(time_s)) + abs(delay_s)) + EVEN_DELAY * float(
             np.min(np.diff(time_s), initial=1.0)
         )
@@ -201,7 +205,10 @@ class StateVariableFilter:
         return Trajectory(out, value, slope)
 
     def run_free(self, time_s: Array, step_s: float | None) -> Array:
-        """States (count, m) after an impulse at the first of the times ``time_s``, evenly ``step_s`` apart or not."""
+        """States (count, m) after an impulse at the first of ``time_s``.
+
+        ``step_s`` is None where the times are uneven.
+        """
         from smartshoe.kernels.polynomial import run_even
 
         if step_s is None:
@@ -220,7 +227,7 @@ def prefilter(order: int, lambda_rad_s: float) -> StateVariableFilter:
 
 
 def split_delay(delay_s: float, step_s: float) -> tuple[int, float]:
-    """Whole steps and the fraction of one, 0 <= fraction < 1; rounding is taken off."""
+    """Whole steps and the remaining fraction, 0 <= fraction < 1, freed of rounding."""
     steps = delay_s / step_s
     whole = int(np.floor(steps + EVEN_DELAY))
     fraction = steps - whole

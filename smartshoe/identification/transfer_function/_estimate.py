@@ -1,4 +1,4 @@
-"""`TransferFunctionEstimate`: a continuous-time transfer function with what is known of it and how well."""
+"""`TransferFunctionEstimate`: a continuous-time transfer function with its uncertainty."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from smartshoe.identification.transfer_function._problem import ErrorGradient, O
 from smartshoe.models.parameter import Parameter
 from smartshoe.signals.noise import NORMAL_95
 
-LEAST_P_VALUE = 1e-3  # of the whiteness test, below which a note says so
-NOISE_FREE = 1e-9  # of the output's spread: a smaller residual is arithmetic
+LEAST_P_VALUE = 1e-3  # of the whiteness test, below which a note is added
+NOISE_FREE = 1e-9  # of the output's spread: a smaller residual is rounding
 
 
 @dataclass(frozen=True)
 class Root:
-    """A pole or zero in rad/s; standard deviations and 95 % intervals of its real and imaginary part."""
+    """A pole or zero in rad/s, with standard deviations and 95 % intervals of its real and imaginary part."""
 
     value: complex
     sd_real: float
@@ -31,28 +31,28 @@ class Root:
 
     @property
     def ci95_real(self) -> tuple[float, float]:
-        """Of the real part."""
+        """95 % interval of the real part."""
         return self.value.real - NORMAL_95 * self.sd_real, self.value.real + NORMAL_95 * self.sd_real
 
     @property
     def ci95_imag(self) -> tuple[float, float]:
-        """Of the imaginary part; both ends 0 for a real root."""
+        """95 % interval of the imaginary part; both ends are 0 for a real root."""
         return self.value.imag - NORMAL_95 * self.sd_imag, self.value.imag + NORMAL_95 * self.sd_imag
 
 
 @dataclass(frozen=True, eq=False)
 class TransferFunctionEstimate:
-    """y = numerator/denominator exp(-delay_s s) u + offset + the start's free response, in seconds.
+    """y = numerator/denominator exp(-delay_s s) u + offset + the initial state's free response, in seconds.
 
-    ``numerator`` (zeros + 1,) and ``denominator`` (poles + 1,) hold the highest power first, the denominator's first
-    being 1. ``covariance`` is that of the numerator's coefficients and then the denominator's without the leading 1, in
-    that order, ``sd`` the root of its diagonal: of the optimum of the output error under white noise, with delay,
-    offsets and initial states unknown where they were estimated. By experiment: ``offsets``, ``initial_states``
-    (experiments, poles) in observer form (the free response is their polynomial, highest power first, over the
-    denominator, from the experiment's start, or with a delay estimated from the first sample that counts) and
-    ``residual`` (measured minus model, NaN where a sample did not count). ``rmse`` is in y's unit; ``fit_percent`` is
-    ``100 (1 - |residual| / |y - mean|)``. ``whiteness`` tests what the error bars take for granted. ``iterations`` are
-    those of ``method``, ``start_iterations`` SRIVC's before it.
+    ``numerator`` (zeros + 1,) and ``denominator`` (poles + 1,) hold the highest power first; the denominator's first is
+    1. ``covariance`` is that of the numerator's coefficients followed by the denominator's without the leading 1,
+    ``sd`` the root of its diagonal. It holds at the optimum of the output error under white noise, with delay, offsets
+    and initial states unknown where they were estimated. By experiment: ``offsets``; ``initial_states`` (experiments,
+    poles) in observer form (the free response is their polynomial, highest power first, over the denominator, from the
+    experiment's start, or with an estimated delay from the first counted sample); and ``residual`` (measured minus
+    model, NaN where a sample was not counted). ``rmse`` is in y's unit; ``fit_percent`` is ``100 (1 - |residual| / |y -
+    mean|)``. ``whiteness`` tests the assumption behind the error bars. ``iterations`` are those of ``method``,
+    ``start_iterations`` those of SRIVC before it.
     """
 
     numerator: Array
@@ -86,7 +86,7 @@ class TransferFunctionEstimate:
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """Each coefficient with its error bar, named b and a with its power of s, and the delay."""
+        """Each coefficient with its error bar, named b or a with its power of s, and the delay."""
         m, n = self.numerator.size - 1, self.denominator.size - 1
         names = [f"b{power}" for power in range(m, -1, -1)] + [f"a{power}" for power in range(n - 1, -1, -1)]
         values = np.concatenate([self.numerator, self.denominator[1:]])
@@ -96,7 +96,7 @@ class TransferFunctionEstimate:
 
     @property
     def correlation(self) -> Array:
-        """The covariance's correlations."""
+        """The correlations that correspond to ``covariance``."""
         safe = np.where(self.sd > 0.0, self.sd, 1.0)
         matrix: Array = self.covariance / np.outer(safe, safe)
         return matrix
@@ -112,7 +112,7 @@ class TransferFunctionEstimate:
     ) -> Array:
         """y (n,) for the input ``u`` (n,), by default at the fit's sample time; exact between samples.
 
-        ``initial_state``: "rest" as if the input had been 0 before, "steady" as if its first value had always been.
+        ``initial_state``: "rest" assumes an input of 0 before, "steady" that its first value had lasted forever.
         """
         if sample_time_s is None and time_s is None:
             sample_time_s = self.sample_time_s
@@ -152,9 +152,9 @@ def summarise(
     n_missing: int,
     notes: Sequence[str],
 ) -> TransferFunctionEstimate:
-    """The estimate at ``theta``, whose ``looks`` give error and gradient.
+    """The estimate at ``theta``; ``looks`` are the errors and gradients there, one per experiment.
 
-    Raises `FloatingPointError` on a gradient that does not tell its parameters apart.
+    Raises `FloatingPointError` on a gradient from which the parameters cannot be distinguished.
     """
     from scipy.linalg import solve_triangular
 
@@ -226,7 +226,7 @@ def summarise(
 def _nuisances(
     problem: OutputError, tail: Array, looks: Sequence[ErrorGradient], root: Array, variance: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Offsets (e,), initial states (e, n) and their standard deviations, the shared parameters' share in them."""
+    """Offsets (e,), initial states (e, n), and their standard deviations including the shared parameters' part."""
     from smartshoe.identification.transfer_function._discrete import StateVariableFilter
 
     n = problem.poles
@@ -249,7 +249,8 @@ def _nuisances(
 def _roots(polynomial: Array, root: Array) -> tuple[Root, ...]:
     """Roots with their standard deviations to first order: d r / d c_k = -r^k / p'(r).
 
-    ``root`` is the root of the covariance of the polynomial's last coefficients; infinite at a double root.
+    ``root`` is a square root of the covariance of the polynomial's last coefficients; sds are infinite at a double
+    root.
     """
     degree = polynomial.size - 1
     powers = np.arange(root.shape[0])[::-1]

@@ -1,4 +1,4 @@
-"""Input and output made ready for a transfer-function fit: one pair for each experiment, what is missing marked."""
+"""Prepares input and output for a transfer-function fit: one pair per experiment, with missing samples masked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from smartshoe.models.first_order import steps
 
 @dataclass(frozen=True, eq=False)
 class InputOutput:
-    """One experiment: ``u`` and ``y`` (n,) with gaps filled, ``counted`` (n,) where both were there.
+    """One experiment: ``u`` and ``y`` (n,) with gaps filled, and the mask ``counted`` (n,) where both were present.
 
     ``step_s`` is the even step, None where ``time_s`` (n,), which begins at 0, is uneven.
     """
@@ -29,7 +29,7 @@ class InputOutput:
 
     @property
     def typical_step_s(self) -> float:
-        """The even step, or the median of the uneven ones."""
+        """The even step in s, or the median of the uneven ones."""
         return self.step_s if self.step_s is not None else float(np.median(np.diff(self.time_s)))
 
 
@@ -54,10 +54,10 @@ def as_signals(values: Any, what: str) -> list[Array]:
 def prepare(
     u: Any, y: Any, *, sample_time_s: float | None, time_s: Any, hold: Intersample, strict: bool = True
 ) -> tuple[list[InputOutput], int]:
-    """The experiments, and how many samples are missing in all.
+    """The experiments, and the total number of missing samples.
 
-    A missing input is bridged as the hold has it, and neither it nor a missing output counts in the error. Raises
-    `UsageError` on arguments that do not fit together; where ``strict``, `NotIdentifiableError` on a constant signal.
+    A missing input is filled according to the hold; neither it nor a missing output counts in the error. Raises
+    `UsageError` for arguments that do not match; if ``strict``, `NotIdentifiableError` for a constant signal.
     """
     inputs, outputs = as_signals(u, "u"), as_signals(y, "y")
     if len(inputs) != len(outputs):

@@ -23,17 +23,17 @@ from smartshoe.kernels.blas import on_one_thread
 Method = Literal["srivc", "gn", "lm", "trf"]
 FALLBACK_RATIOS = (4.0, 0.25, 16.0, 1 / 16)
 AUTOMATIC_PREFILTERS = 9
-SHORT_LOOK = 4  # iterations of SRIVC that tell one delay or prefilter from another
+SHORT_LOOK = 4  # iterations of SRIVC to compare delays or prefilters
 FRACTIONS = (0.0, 0.25, 0.5, 0.75, -0.25, -0.5, -0.75)
-CELLS = 6  # samples of delay that are walked at most from the best start
-NEAR_END = 1e-3  # of a sample, from a cell's end
-SAME_COST = 1e-5  # of the cost
-SINGULAR = 1e-13  # of the largest singular value of the gradient, columns scaled: below it there is only rounding
+CELLS = 6  # samples of delay to move at most from the best start
+NEAR_END = 1e-3  # samples from a cell's end that count as near
+SAME_COST = 1e-5  # relative difference of costs that count as equal
+SINGULAR = 1e-13  # of the scaled gradient's largest singular value: smaller ones are rounding
 
 
 @dataclass(frozen=True)
 class _FitOptions:
-    """How each part of the fit goes about it."""
+    """Options of the individual parts of the fit."""
 
     method: Method
     prefilter_rad_s: float | None
@@ -71,18 +71,18 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
     poles, zeros
         Degrees of A and B.
     sample_time_s, time_s
-        When they were taken: the one, or the other (n,) with any steps.
+        The even sampling step in s, or instead the times (n,) in s, with any steps.
     method : {"trf", "gn", "lm", "srivc"}
-        SRIVC alone, or from it one of the others, which share one output error and analytic gradient.
+        SRIVC alone, or one of the others started from it, which share one output error and analytic gradient.
     intersample : {"zoh", "foh"}
-        Whether the input is held or straight between samples.
+        Whether the input is constant or linear between samples.
     prefilter_rad_s
         The lambda of SRIVC's first filter, about the bandwidth; by default several are tried.
     delay_s, max_delay_s
         A number or "estimate", from 0 up to ``max_delay_s`` (by default a quarter of the shortest experiment, 500
         samples at most).
     initial_state : {"estimate", "rest", "steady"}
-        "rest": input and output were 0 before; "steady": the first input had always been.
+        "rest": input and output were 0 before; "steady": the first input had lasted forever.
     offset
         Of the output, in y's unit: "estimate", one for each experiment, or a number.
     tolerance, max_iterations, strict
@@ -156,25 +156,25 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
 
 
 class _StructureFit:
-    """One data set and structure, fitted at a known delay or with it."""
+    """The fit of one data set with one structure, at a known or estimated delay."""
 
     def __init__(self, experiments: Sequence[InputOutput], structure: Structure, options: _FitOptions) -> None:
         self.experiments, self.structure, self.options = experiments, structure, options
 
     def problem(self, *, delayed: bool, delay_s: float = 0.0, most_delay_s: float | None = None) -> OutputError:
-        """The output error with this structure."""
+        """The output error of this data set with this structure, with the delay fixed or a parameter (``delayed``)."""
         return OutputError(
             self.experiments, self.structure, delayed=delayed, delay_s=delay_s, most_delay_s=most_delay_s
         )
 
     def at(self, delay_s: float) -> tuple[OutputError, Settled, int, list[str]]:
-        """Problem, end, SRIVC's iterations and notes, the delay being known."""
+        """Problem, final state, SRIVC's iterations and notes, for a known delay."""
         problem = self.problem(delayed=False, delay_s=delay_s)
         started, notes = self.start(problem, delay_s, self.options.max_iterations)
         return problem, self.finish(problem, started), started.iterations, notes
 
     def with_delay(self, max_delay_s: float | None) -> tuple[OutputError, Settled, int, list[str]]:
-        """The same, the delay being a parameter: a grid of whole samples, then all together from the best."""
+        """As `at`, with the delay as a parameter: first a grid of whole samples, then all together from the best."""
         whole = self.problem(delayed=False)
         most_s = delay.longest_delay_s(whole) if max_delay_s is None else float(max_delay_s)
         grid = delay.delay_grid(whole, most_s)
@@ -185,7 +185,7 @@ class _StructureFit:
                 if index in seen:
                     continue
                 seen.add(index)
-                # Every delay is judged on every sample: a late window could leave out the one step of a record.
+                # All delays are compared on all samples: a later window might exclude a record's only step.
                 here = self.problem(delayed=False, delay_s=float(grid[index]), most_delay_s=0.0)
                 try:
                     theta = self.first_guess(here, prefilter, float(grid[index]))
@@ -211,7 +211,7 @@ class _StructureFit:
                 ends.append(self.walk(*self.between_samples(there_s, rival, step_s, most_s), step_s, most_s))
             except (FloatingPointError, NotIdentifiableError):
                 continue
-        # The ends are compared on the samples that the latest of them leaves.
+        # Results are compared on the samples that remain at the longest of their delays.
         latest = max((problem for problem, _, _ in ends), key=lambda problem: problem.most_delay_s)
         problem, found, begun = min(ends, key=lambda end: latest.cost(end[1].theta))
         at_s = float(found.theta[-1])
@@ -223,7 +223,10 @@ class _StructureFit:
         return problem, found, begun.iterations, notes
 
     def walk(self, at_s: float, theta: Array, step_s: float, most_s: float) -> tuple[OutputError, Settled, Settled]:
-        """Problem, end, and SRIVC's end before it, all parameters together, from ``at_s`` from cell to cell."""
+        """Problem, the method's result and SRIVC's before it, for all parameters together, moving from cell to cell.
+
+        The search starts at the delay ``at_s``.
+        """
         for _ in range(CELLS):
             problem = self.problem(delayed=True, most_delay_s=min(at_s + 2.0 * step_s, most_s))
             ended = [
@@ -234,7 +237,7 @@ class _StructureFit:
             ended_s = float(found.theta[-1])
             theta = found.theta[:-1]
             found = replace(found, theta=np.append(theta, delay.snapped(ended_s, low_s, high_s, step_s)))
-            # From near a cell's end the next cell is tried, unless it was: then that is a kink's lowest point.
+            # Near a cell's end the next cell is tried; if it was tried before, the minimum is the kink between them.
             before_s, at_s = at_s, delay.snapped(ended_s, low_s, high_s, step_s, near=NEAR_END)
             moved = abs(at_s - before_s) >= delay.MARGIN * step_s
             if low_s < at_s < high_s or at_s in (0.0, most_s) or not moved:
@@ -244,7 +247,7 @@ class _StructureFit:
     def in_cell(
         self, problem: OutputError, theta: Array, cell: tuple[float, float]
     ) -> tuple[tuple[Settled, Settled], tuple[float, float]]:
-        """The method's end and SRIVC's before it with the delay inside ``cell``, and the cell."""
+        """The method's result and SRIVC's before it with the delay inside ``cell``, and the cell."""
         started = srivc(
             problem,
             theta,
@@ -255,7 +258,7 @@ class _StructureFit:
         return (self.finish(problem, started, cell), started), cell
 
     def between_samples(self, at_s: float, theta: Array, step_s: float, most_s: float) -> tuple[float, Array]:
-        """The best of a few fractions of a sample around ``at_s``, and theta there."""
+        """The best of a few fractional delays around ``at_s``, and theta there."""
         window_s = min(at_s + step_s, most_s)
         tried: list[tuple[float, float, Settled]] = []
         for fraction in FRACTIONS:
@@ -274,7 +277,7 @@ class _StructureFit:
         return best_s, best.theta
 
     def prefilters(self, problem: OutputError) -> list[float]:
-        """The lambdas to try, in rad/s: the user's and wider ones, or the band that the data can show."""
+        """The lambdas to try, in rad/s: the user's and wider ones, or ones over the band that the data can resolve."""
         if self.options.prefilter_rad_s is not None:
             given = self.options.prefilter_rad_s
             return [given, *(given * ratio for ratio in FALLBACK_RATIOS)]
@@ -285,22 +288,22 @@ class _StructureFit:
         return [float(band[index]) for index in middle_first]
 
     def screens(self, problem: OutputError) -> list[float]:
-        """The lambdas to look for a delay behind: slow ones too, since the noise of fast ones hides it."""
+        """Lambdas of the delay search in rad/s, slow ones included, since noise behind fast ones hides the delay."""
         if self.options.prefilter_rad_s is not None:
             return [self.options.prefilter_rad_s * ratio for ratio in (1.0, 0.25, 1 / 16)]
         return sorted(self.prefilters(problem))[:-1:2]
 
     def first_guess(self, problem: OutputError, prefilter_rad_s: float, delay_s: float) -> Array:
-        """theta by least squares behind one state-variable filter, made stable."""
+        """theta by least squares behind one state-variable filter, with unstable poles reflected."""
         theta = least_squares(problem, prefilter_rad_s, delay_s)
         theta[problem.zeros + 1 :] = reflected(theta[problem.zeros + 1 :])
         return theta
 
     def start(self, problem: OutputError, delay_s: float, max_iterations: int) -> tuple[Settled, list[str]]:
-        """SRIVC's end, and what is worth saying of it.
+        """SRIVC's result, and notes about it.
 
-        From the user's prefilter, or where that does not settle from others; without one, from the prefilter whose
-        first few iterations get furthest, or as soon as two have ended at the same best cost.
+        It starts from the user's prefilter, or if that does not converge from others; without one, from the prefilter
+        whose first few iterations reach the lowest cost, or as soon as two have ended at the same best cost.
         """
         given = self.options.prefilter_rad_s
         ended: list[tuple[Settled, float]] = []
@@ -329,13 +332,13 @@ class _StructureFit:
         return best, [f"SRIVC did not settle from the prefilter given, it did from {prefilter:g} rad/s"]
 
     def srivc(self, problem: OutputError, theta: Array, max_iterations: int) -> Settled:
-        """SRIVC from ``theta`` with the user's tolerance."""
+        """The result of SRIVC from ``theta`` with the user's tolerance."""
         return srivc(problem, theta, tolerance=self.options.tolerance, max_iterations=max_iterations)
 
     def finish(
         self, problem: OutputError, started: Settled, delay_bounds_s: tuple[float, float] = (0.0, np.inf)
     ) -> Settled:
-        """Where the method ends from SRIVC's end."""
+        """The result of the method, started from SRIVC's."""
         if self.options.method == "srivc":
             return started
         whitened = Whitened(problem, started.theta, delay_bounds_s)
@@ -350,7 +353,7 @@ class _StructureFit:
 
 
 def _agreed(ended: Sequence[Settled]) -> bool:
-    """Whether the two lowest costs belong to settled fits and are one."""
+    """Whether the two lowest costs belong to converged fits and are equal."""
     first, *others = sorted(ended, key=lambda one: one.cost)
     return bool(
         others and first.converged and others[0].converged and others[0].cost - first.cost <= SAME_COST * first.cost
@@ -369,7 +372,7 @@ def _require_distinct(columns: Array) -> None:
 
 
 def _require_within(experiments: Sequence[InputOutput], delay_s: float | str) -> None:
-    """Raise `UsageError` for a number ``delay_s`` by which nothing of an experiment's input is in its output."""
+    """Raise `UsageError` for a ``delay_s`` so long that nothing of an experiment's input reaches its output."""
     shortest_s = min(float(one.time_s[-1] - one.time_s[0]) for one in experiments)
     if not isinstance(delay_s, str) and delay_s >= shortest_s:
         raise UsageError(f"delay_s is {delay_s:g} s and the shortest experiment lasts {shortest_s:g} s: give less")

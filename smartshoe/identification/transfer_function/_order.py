@@ -1,4 +1,4 @@
-"""Which order the data support: YIC, BIC and the error on data that was left out, over a grid of structures."""
+"""Selects the model order: YIC, BIC and the error on held-out data, over a grid of structures."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Criterion = Literal["bic", "yic", "held_out"]
 
 @dataclass(frozen=True)
 class OrderCandidate:
-    """One structure. ``estimate`` is of all data, None where ``refused`` says why there is none; lower is better.
+    """One structure. ``estimate`` uses all data, None where ``refused`` gives the reason; lower criteria are better.
 
-    ``yic`` is Young's information criterion ln(sd_e^2/sd_y^2) + ln(mean of sd^2/theta^2): the fit against how well its
-    coefficients are known (Young and Jakeman 1980; Young 1989). ``bic`` is n ln(rmse^2) + p ln n (Schwarz 1978).
-    ``held_out_rmse``, in y's unit, is the error on data that was not fitted.
+    ``yic`` is Young's information criterion ln(sd_e^2/sd_y^2) + ln(mean of sd^2/theta^2), which weighs the fit against
+    the uncertainty of its coefficients (Young and Jakeman 1980; Young 1989). ``bic`` is n ln(rmse^2) + p ln n (Schwarz
+    1978). ``held_out_rmse``, in y's unit, is the error on data that was not fitted.
     """
 
     poles: int
@@ -38,7 +38,7 @@ class OrderCandidate:
 
 @dataclass(frozen=True)
 class OrderSelection:
-    """``candidates``, the best by ``criterion`` first, the refused last."""
+    """All ``candidates``, the best by ``criterion`` first, refused ones last."""
 
     candidates: tuple[OrderCandidate, ...]
     criterion: Criterion
@@ -73,7 +73,7 @@ def select_order(
     poles, zeros
         The degrees to try.
     criterion
-        By which structures are ordered.
+        The criterion by which structures are ordered.
     held_out_share
         Several experiments are left out one at a time; of a single one, this share at its end. What is left out keeps
         its own offset and initial state, as every experiment does, and its error counts the freedom that they take.
@@ -109,7 +109,7 @@ def select_order(
 
 
 class _Experiments:
-    """The experiments as lists, and parts of them."""
+    """The experiments as lists, which can be split."""
 
     def __init__(self, u: Any, y: Any, sample_time_s: float | None, time_s: Any) -> None:
         self.u, self.y, self.sample_time_s = as_signals(u, "u"), as_signals(y, "y"), sample_time_s
@@ -128,7 +128,7 @@ class _Experiments:
         }
 
     def splits(self, share: float) -> list[tuple[list[tuple[int, slice]], tuple[int, slice]]]:
-        """What is fitted and what is left out."""
+        """Pairs of the parts to fit and the part to hold out."""
         count = len(self.u)
         if count > 1:
             every = slice(None)
@@ -162,7 +162,7 @@ def _candidate(data: _Experiments, poles: int, zeros: int, share: float, options
 def _held_out(
     part: dict[str, Any], estimate: TransferFunctionEstimate, options: dict[str, Any], *, single: bool
 ) -> tuple[Array, int]:
-    """Error on the left-out experiment, and how many unknowns of its own it was given."""
+    """Error on the held-out experiment, and the number of its own unknowns that were fitted to it."""
     experiments, _ = prepare(**part, hold=estimate.intersample, strict=False)
     offset = options.get("offset", "estimate")
     problem = OutputError(
@@ -171,7 +171,7 @@ def _held_out(
             poles=estimate.denominator.size - 1,
             zeros=estimate.numerator.size - 1,
             hold=estimate.intersample,
-            # A record cut in two is in motion where its second part begins.
+            # When a record is cut in two, the second part does not begin at rest.
             initial_state="estimate" if single else options.get("initial_state", "estimate"),
             offset=None if offset == "estimate" else float(offset),
         ),

@@ -1,10 +1,10 @@
-"""The output error of a continuous-time transfer function, its analytic gradient, and what SRIVC needs beside them.
+"""The output error of a continuous-time transfer function, its analytic gradient, and what SRIVC needs besides.
 
-y(t) = B(s)/A(s) exp(-s tau) u + C(s)/A(s) delta + offset: the start of an experiment acts like an impulse at its first
-sample, seen through a numerator C of its own (its coefficients are the initial state in observer form). C and the
-offset enter linearly, so they are fitted anew at every theta and projected out of the gradient (variable projection,
-Golub and Pereyra 1973, with Kaufman's gradient, which is exact for the cost's gradient). What is left is
-theta = (B, A without its leading 1, tau), highest powers first, as short for fifty experiments as for one.
+y(t) = B(s)/A(s) exp(-s tau) u + C(s)/A(s) delta + offset: the initial state of an experiment acts like an impulse at
+its first sample, seen through a numerator C of its own (its coefficients are the initial state in observer form). C and
+the offset enter linearly, so they are fitted at every theta and projected out of the gradient (variable projection,
+Golub and Pereyra 1973, with Kaufman's gradient, which is exact for the cost's gradient). What remains is theta = (B, A
+without its leading 1, tau), highest powers first, whose size does not depend on the number of experiments.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from smartshoe.identification.transfer_function._discrete import Intersample, St
 from smartshoe.identification.transfer_function._experiment import InputOutput
 
 InitialState = Literal["estimate", "steady", "rest"]
-RANK_TOLERANCE = 1e-11  # of the largest column: an initial state that dies within a step leaves no trace
+RANK_TOLERANCE = 1e-11  # of the largest column: an initial state that decays within a step has no effect
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """What one experiment adds linearly: ``basis`` (n, r) orthonormal, and the way back to its coefficients.
+    """The linear unknowns of one experiment: ``basis`` (n, r) orthonormal, and the map back to coefficients.
 
-    Fitted output = basis @ t; coefficients of the columns = ``back`` (c, r) @ t, initial state before offset.
+    Fitted output = basis @ t; coefficients = ``back`` (c, r) @ t, initial state before offset.
     """
 
     basis: Array
     back: Array
 
     def clear(self, columns: Array) -> Array:
-        """``columns`` (n,) or (n, k) without what the basis can take."""
+        """``columns`` (n,) or (n, k) with their projection on the basis removed."""
         if not self.basis.shape[1]:
             return columns
         left: Array = columns - self.basis @ (self.basis.T @ columns)
@@ -46,8 +46,8 @@ class Nuisance:
 class ErrorGradient:
     """One experiment at one theta: ``error`` (n,) = measured - model, ``columns`` (n, p) = d model / d theta.
 
-    Both are cleared of the nuisances and 0 where a sample does not count. ``coefficients`` are the nuisances' own.
-    ``leaning`` (r, p) is what the nuisances' basis took of the columns, for the nuisances' covariance.
+    In both, the nuisance parameters are projected out, and uncounted samples are 0. ``coefficients`` are the nuisance
+    parameters. ``leaning`` (r, p) is the projection of the columns on their basis, needed for their covariance.
     """
 
     error: Array
@@ -59,10 +59,10 @@ class ErrorGradient:
 
 @dataclass(frozen=True)
 class Structure:
-    """What is fitted: degrees of A and B, the input between samples, where an experiment begins, and the offset.
+    """What is fitted: degrees of A and B, the input between samples, an experiment's initial state, and the offset.
 
-    ``hold`` says whether the input is held or straight between samples. ``offset`` in the output's unit, None where
-    each experiment has one of its own that is estimated.
+    ``hold`` tells whether the input is constant or linear between samples. ``offset`` is in the output's unit, None
+    where each experiment has its own estimated one.
     """
 
     poles: int
@@ -73,12 +73,12 @@ class Structure:
 
 
 class OutputError:
-    """Experiments and a structure; a `smartshoe.identification._solve.Problem` by way of `Whitened`.
+    """Experiments and a structure; `Whitened` makes it a `smartshoe.identification._solve.Problem`.
 
-    ``firsts`` are the first samples that count: with the initial state estimated, an experiment begins at
-    ``most_delay_s`` (by default ``delay_s``), where the delayed input has begun, since nothing is known of the input
-    before; where it begins earlier, the first input stands for what came before. ``delayed`` says whether theta holds
-    the delay, else ``delay_s`` is it.
+    ``firsts`` are the first counted samples. With an estimated initial state, an experiment begins at ``most_delay_s``
+    (by default ``delay_s``), where the delayed input begins, since the input before is not known; otherwise the first
+    input is assumed to have lasted before. ``delayed`` tells whether theta contains the delay; if not, it is
+    ``delay_s``.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class OutputError:
 
     @property
     def size(self) -> int:
-        """How many shared parameters."""
+        """The number of shared parameters."""
         return self.zeros + 1 + self.poles + self.delayed
 
     def _first(self, experiment: InputOutput) -> int:
@@ -113,21 +113,21 @@ class OutputError:
         return min(int(np.searchsorted(experiment.time_s, self.most_delay_s * (1.0 - 1e-9))), latest)
 
     def _drive(self, experiment: InputOutput) -> tuple[Array, Array, int]:
-        """Input, its times and how many samples were put before: at rest the input was 0 before it began."""
+        """Input, its times, and the number of prepended samples: at rest the input was 0 before the record."""
         u, knots = experiment.u, experiment.time_s
         if self.initial_state != "rest":
             return u, knots, 0
         return np.concatenate([[0.0], u]), np.concatenate([[-experiment.typical_step_s], knots]), 1
 
     def split(self, theta: Array) -> tuple[Array, Array, float]:
-        """Numerator, denominator without its leading 1, delay in s."""
+        """Numerator, denominator without its leading 1, and delay in s."""
         m = self.zeros + 1
         return theta[:m], theta[m : m + self.poles], float(theta[-1]) if self.delayed else self.delay_s
 
     def forced(self, chain: StateVariableFilter, index: int, delay_s: float, start: Array | None = None) -> Trajectory:
-        """The chain driven by the input of experiment ``index`` from its first sample that counts, there in ``start``.
+        """The chain driven by the input of experiment ``index`` from its first counted sample, starting in ``start``.
 
-        By default it starts from 0, or where the first input would have led it if the start is steady.
+        By default it starts from 0, or for a steady start from equilibrium with the first input.
         """
         experiment = self.experiments[index]
         u, knots, before = self.drives[index]
@@ -140,7 +140,7 @@ class OutputError:
         return chain.run_uneven(u, knots, experiment.time_s[begin:], start, self.hold, delay_s)
 
     def filtered(self, chain: StateVariableFilter, index: int, signal: Array) -> Trajectory:
-        """The chain driven by ``signal``, one value for each sample from the first that counts, straight between."""
+        """The chain driven by ``signal``, one value per sample from the first counted one, linear in between."""
         experiment = self.experiments[index]
         time_s = experiment.time_s[self.firsts[index] :]
         start = np.zeros(chain.size)
@@ -149,12 +149,12 @@ class OutputError:
         return chain.run_uneven(signal, time_s, time_s, start, "foh", 0.0)
 
     def free(self, chain: StateVariableFilter, index: int) -> Array:
-        """The chain's states after an impulse at the first sample that counts."""
+        """The chain's states after an impulse at the first counted sample."""
         experiment = self.experiments[index]
         return chain.run_free(experiment.time_s[self.firsts[index] :], experiment.step_s)
 
     def nuisance(self, chain: StateVariableFilter, index: int, free: Array | None) -> Nuisance:
-        """The orthonormal basis of what experiment ``index`` adds, 0 where a sample does not count."""
+        """The orthonormal basis of the linear unknowns of experiment ``index``; 0 where a sample is not counted."""
         from scipy.linalg import qr, solve_triangular
 
         counted = self.experiments[index].counted[self.firsts[index] :]
@@ -176,7 +176,7 @@ class OutputError:
         return Nuisance(np.asarray(basis[:, :rank]), back / norm[:, None])
 
     def look(self, theta: Array) -> list[ErrorGradient]:
-        """Every experiment at ``theta`` (size,); a look that is not finite is one at a theta that cannot be."""
+        """Error and gradient of every experiment at ``theta`` (size,); not finite at an impossible theta."""
         numerator, denominator, delay_s = self.split(theta)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             chain = StateVariableFilter(denominator)
@@ -202,7 +202,7 @@ class OutputError:
                 coefficients = nuisance.back @ taken
                 denominators = -run.states @ forced_map.T
                 if free is not None:
-                    # The state's coefficients stand beside balanced derivatives, lowest first.
+                    # The coefficients of the state belong to balanced derivatives, lowest first.
                     own = (coefficients[: self.poles] / chain.scale[-self.poles :])[::-1]
                     denominators -= free @ chain.denominator_map(own).T
                 columns = [numerators, denominators]
@@ -228,7 +228,7 @@ class OutputError:
         return looks
 
     def cost(self, theta: Array) -> float:
-        """e'e at ``theta``."""
+        """The sum of squares e'e at ``theta``."""
         return float(sum(one.error @ one.error for one in self.look(theta)))
 
     def output(self, theta: Array, index: int) -> Array:
@@ -252,11 +252,11 @@ class OutputError:
 
 
 class Whitened:
-    """The problem in coordinates ``rotation`` @ theta whose columns were orthonormal where the fit starts.
+    """The problem in coordinates ``rotation`` @ theta, whose gradient columns are orthonormal at the start of the fit.
 
-    Coefficients of high powers are nearly collinear and of very different size; in these coordinates the normal matrix
+    Coefficients of high powers are nearly collinear and differ widely in size; in these coordinates the normal matrix
     is near the identity, so that forming it loses no digits. The rotation is upper triangular and the delay comes last,
-    so that the delay's bounds stay bounds.
+    so that the delay's bounds remain bounds.
     """
 
     def __init__(self, problem: OutputError, theta: Array, delay_bounds_s: tuple[float, float] = (0.0, np.inf)) -> None:
@@ -268,12 +268,12 @@ class Whitened:
             self.lower[-1], self.upper[-1] = np.multiply(delay_bounds_s, self.rotation[-1, -1])
 
     def inside(self, theta: Array) -> Array:
-        """theta in these coordinates."""
+        """theta converted to these coordinates."""
         rotated: Array = self.rotation @ theta
         return rotated
 
     def outside(self, rotated: Array) -> Array:
-        """The way back to theta."""
+        """theta from these coordinates."""
         from scipy.linalg import solve_triangular
 
         return np.asarray(solve_triangular(self.rotation, rotated))
@@ -299,7 +299,7 @@ class Whitened:
 
 
 def orthogonal_factor(columns: Array) -> Array:
-    """Upper triangular R (p, p) with columns = Q R and a positive diagonal; raises on columns that do not matter."""
+    """Upper triangular R (p, p) with columns = Q R and a positive diagonal; raises where a column has no effect."""
     norm = np.sqrt(np.einsum("ij,ij->j", columns, columns))
     if not (norm > 0.0).all() or not np.isfinite(norm).all():
         raise FloatingPointError("a parameter has no effect on the output")

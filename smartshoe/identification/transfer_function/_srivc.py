@@ -1,7 +1,8 @@
 """SRIVC for any order: the simplified refined instrumental variable method for continuous time.
 
-Young and Jakeman (1980), Garnier and Wang (2008, chapter 4). A state-variable filter 1/(s + lambda)^n and least squares
-start it; then filter 1/A and instrument (the auxiliary model's own filtered derivatives) are renewed until they settle.
+Young and Jakeman (1980), Garnier and Wang (2008, chapter 4). Least squares behind a state-variable filter 1/(s +
+lambda)^n gives the start; then the filter 1/A and the instrument (the auxiliary model's own filtered derivatives) are
+updated until they converge.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification.transfer_function._discrete import StateVariableFilter, prefilter
 from smartshoe.identification.transfer_function._problem import ErrorGradient, OutputError
 
-NEGLIGIBLE_STEP = 1e-3  # of a standard error, over all parameters together
+NEGLIGIBLE_STEP = 1e-3  # standard errors, over all parameters together
 FIRST_STEPS, FIRST_CLIMB = 3, 1.5  # steps that may raise the cost, and by how much
 HALVINGS = 14
 
 
 @dataclass(frozen=True)
 class Settled:
-    """theta, how many instruments were needed, whether they settled, and the cost e'e there."""
+    """theta, the number of updates, whether they converged, and the cost e'e there."""
 
     theta: Array
     iterations: int
@@ -32,7 +33,7 @@ class Settled:
 
 
 def reflected(denominator: Array) -> Array:
-    """``denominator`` (n,) without its leading 1, roots of the right half plane mirrored into the left."""
+    """``denominator`` (n,) without its leading 1, with roots of the right half plane mirrored into the left."""
     roots = np.roots(np.concatenate([[1.0], denominator]))
     if not (roots.real > 0.0).any():
         return denominator
@@ -40,7 +41,7 @@ def reflected(denominator: Array) -> Array:
 
 
 def least_squares(problem: OutputError, prefilter_rad_s: float, delay_s: float) -> Array:
-    """theta by least squares on y^(n) = -A y + B u behind 1/(s + lambda)^n; the output straight between samples."""
+    """theta by least squares on y^(n) = -A y + B u behind 1/(s + lambda)^n; the output is linear between samples."""
     n = problem.poles
     chain = prefilter(n, prefilter_rad_s)
     rows, _ = chain.derivatives_of_x()
@@ -61,7 +62,7 @@ def least_squares(problem: OutputError, prefilter_rad_s: float, delay_s: float) 
             inputs[:, 0] += run_u.value
         outputs = run_y.states @ rows[n - 1 :: -1][:n].T
         highest = run_y.states @ rows[n] + y
-        # The filter's own start is unknown whatever the system's is, since the output's first value holds noise.
+        # The filter's initial state is unknown in any case, since the output's first value is noisy.
         nuisance = problem.nuisance(chain, index, problem.free(chain, index))
         block = np.hstack([inputs, -outputs, highest[:, None]])
         block[~counted] = 0.0
@@ -82,13 +83,13 @@ def srivc(
     max_iterations: int,
     delay_bounds_s: tuple[float, float] = (0.0, np.inf),
 ) -> Settled:
-    """Renew filter and instrument from ``theta`` until a step is below ``tolerance`` of theta or of no consequence.
+    """Update filter and instrument from ``theta`` until a step is below ``tolerance`` of theta or negligible.
 
     The regressors are the filtered derivatives of the measured output. Between samples only the residual is taken as
-    straight; the model's part is exact, so that noise-free data give the exact answer and the fixed point is the
-    output error's own optimum. A delay takes a Gauss-Newton step beside it. Where the step leads uphill (the iteration
-    has no proof of convergence, and poor data make it circle), the Gauss-Newton step, the same with the instruments as
-    regressors, takes its place.
+    linear; the model's part is exact, so that noise-free data give the exact result and the fixed point is the output
+    error's optimum. A delay is estimated by a Gauss-Newton step alongside. Where the step leads uphill (the iteration
+    has no proof of convergence, and may cycle on poor data), the Gauss-Newton step, which uses the instruments as
+    regressors, replaces it.
     """
     theta = _inside(problem, theta, delay_bounds_s)
     looks = problem.look(theta)
@@ -111,14 +112,14 @@ def srivc(
             reached = _cost(following)
             if best is None or reached < best[0]:
                 best = (reached, trial, following)
-            # The first steps come from so poor a model that uphill may be the way.
+            # The first steps start from such a poor model that going uphill may be right.
             if settled or reached <= cost * (FIRST_CLIMB if iteration <= FIRST_STEPS else 1.0):
                 best = (reached, trial, following)
                 break
         if best is None:
             return Settled(theta, iteration, False, cost)
         if best[0] > cost and iteration > FIRST_STEPS and not settled:
-            # No way leads down within rounding: the optimum, if the step that is left is of no consequence.
+            # No step leads downhill beyond rounding: this is the optimum if the remaining step is negligible.
             return Settled(theta, iteration, length <= 0.1 * noise or relative < 1e3 * tolerance, cost)
         cost, theta, looks = best
         if settled:
@@ -140,9 +141,9 @@ def _inside(problem: OutputError, theta: Array, delay_bounds_s: tuple[float, flo
 
 
 class _Ways:
-    """The steps that one look offers; each as the step, its share of theta, and how far it moves the output.
+    """The steps available at one theta; each is the step, its relative size, and how far it moves the output.
 
-    The delay moves by a sample at most and stays inside its bounds; the rest is solved with the move that it can make.
+    The delay moves by at most one sample and stays within its bounds; the rest is solved given that move.
     """
 
     def __init__(
@@ -157,7 +158,7 @@ class _Ways:
         self.error = self.basis.T @ np.concatenate([look.error for look in looks])
 
     def refined(self) -> tuple[Array, float, float]:
-        """SRIVC's: instruments' rows, the measured output's filtered derivatives as regressors."""
+        """SRIVC's step: rows of the instruments, with the measured output's filtered derivatives as regressors."""
         m, n = self.problem.zeros + 1, self.problem.poles
         chain = StateVariableFilter(self.theta[m : m + n], levels=1)
         rows, _ = chain.derivatives_of_x()
@@ -172,7 +173,7 @@ class _Ways:
         return self._solved(normal)
 
     def descending(self) -> tuple[Array, float, float]:
-        """Gauss-Newton's: the same without the residual's filtered derivatives."""
+        """Gauss-Newton's step: the same without the residual's filtered derivatives."""
         return self._solved(self.triangle)
 
     def _solved(self, normal: Array) -> tuple[Array, float, float]:

@@ -1,6 +1,6 @@
-"""Every estimator of force: a module of this folder, called as the estimator, with the class as ``ESTIMATOR``.
+"""The estimators of force: each is a module of this folder named like the estimator, with the class as ``ESTIMATOR``.
 
-Another package offers one by the entry-point group ``smartshoe.estimators`` (docs/extending.md).
+Other packages offer theirs by the entry-point group ``smartshoe.estimators`` (docs/extending.md).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ GROUP = "smartshoe.estimators"
 
 
 def estimator_names() -> tuple[str, ...]:
-    """The names of all estimators, in their order; none of them is imported."""
+    """The names of all estimators, in their order, without importing any."""
     return tuple(sorted({*_own(), *_installed()}))
 
 
@@ -66,7 +66,7 @@ def estimator(
 
 
 def require_known(name: str) -> None:
-    """Raises `UsageError` for a name that no estimator has."""
+    """Raise `UsageError` for a name that belongs to no estimator."""
     if name not in estimator_names():
         raise UsageError(f"estimator {name!r} is not known: use one of {', '.join(estimator_names())}")
 
@@ -88,7 +88,7 @@ def _loaded(entry: EntryPoint) -> Any:
 
     try:
         kind = entry.load()
-    except Exception as error:  # whatever another package does
+    except Exception as error:  # another package may raise anything
         raise UsageError(
             f"the estimator {entry.name} ({entry.value}) cannot be loaded ({error}): update or remove its package"
         ) from error

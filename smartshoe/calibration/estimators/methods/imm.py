@@ -1,4 +1,4 @@
-"""Interacting multiple models: a unit under load and a unit in the air, mixed by how likely each is (filterpy)."""
+"""Interacting multiple models: a loaded unit and an unloaded one, weighted by their likelihood (filterpy)."""
 
 from __future__ import annotations
 
@@ -11,21 +11,24 @@ from smartshoe.calibration.estimators._estimate import ForceEstimate, ForceRun
 from smartshoe.calibration.estimators._kalman import KalmanEstimator, ahead, filter_of, straight
 from smartshoe.calibration.estimators._state_space import contact_model, swing_model
 
-STANCE_S, SWING_S = 0.6, 0.4  # how long either lasts on average, at a walk
-FALL_S = 0.02  # within which a load is gone that the foot takes off
-RESIDUAL = 0.002  # of the largest load: what a lace and a sock press in the air
-LEAST_CHANCE = 1e-12  # of a model: below it neither would come back
+STANCE_S, SWING_S = 0.6, 0.4  # average durations when walking
+FALL_S = 0.02  # within which the load vanishes when the foot is lifted
+RESIDUAL = 0.002  # of the largest load: pressure of lace and sock in the air
+LEAST_CHANCE = 1e-12  # of a model: less could never recover
 
 
 class InteractingModels(KalmanEstimator):
-    """Two Kalman filters, contact and swing, whose probabilities the readings tell (Bar-Shalom 2001, section 11.6)."""
+    """Two Kalman filters, contact and swing, with probabilities from the readings (Bar-Shalom 2001, section 11.6)."""
 
     def _run(self, density: float, noise_sd: float, largest: float) -> InteractingRun:
         return InteractingRun(self, density, noise_sd, largest)
 
 
 class InteractingRun(ForceRun):
-    """The two under way; ``contact`` (n,) is the probability of contact at each sample of the last block."""
+    """The two filters while running.
+
+    ``contact`` (n,) is the probability of contact at each sample of the last block.
+    """
 
     def __init__(self, kind: InteractingModels, density: float, noise_sd: float, largest: float) -> None:
         c, rate_hz = kind.calibration, kind.sample_rate_hz
@@ -57,7 +60,7 @@ class InteractingRun(ForceRun):
             mixed = self._mixed
             if not missing[k]:
                 mixed.update(value)
-                # A model that is ruled out to the last bit has no likelihood left to come back with.
+                # A model whose probability has become exactly zero could never recover.
                 mixed.mu = np.maximum(mixed.mu, LEAST_CHANCE)
                 mixed.mu /= mixed.mu.sum()
             force_n[k], sd_n[k] = look @ mixed.x[:, 0], np.sqrt(max(look @ mixed.P @ look, 0.0))

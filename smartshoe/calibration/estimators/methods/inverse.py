@@ -1,4 +1,4 @@
-"""The inverse of an extended model."""
+"""The estimator ``inverse``: the inverse of an extended model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ExtendedInverse(Filtered):
             )
 
     def force_filter(self) -> ForceFilter:
-        """The filter, without a past."""
+        """The calibration's compensator in its initial state."""
         return self.calibration.compensator(self.sample_rate_hz)
 
 

@@ -1,4 +1,4 @@
-"""The static gain: what the paper compares with."""
+"""The estimator ``static``: the static gain, with which the paper compares."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class StaticGain(Estimator):
     """Force = b1/a1 (reading - offset)."""
 
     def begin(self, readings: Array, missing: Mask) -> ForceRun:
-        """The gain; the reading's noise is that of these readings."""
+        """A run that applies the gain; the reading's noise is estimated from these readings."""
         noise_sd = reading_noise_sd(readings, missing) if self.noise_sd is None else self.noise_sd
         return _Gain(self.calibration.b1 / self.calibration.a1, self.calibration.offset, noise_sd)
 
@@ -24,7 +24,7 @@ class _Gain(ForceRun):
         self._last: float | None = None
 
     def push(self, readings: Array, missing: Mask) -> ForceEstimate:
-        """One that is missing repeats the last, or is the first that is there."""
+        """Forces of the readings; a missing one repeats the last, or takes the first one present."""
         if not missing.all():
             held = np.maximum.accumulate(np.where(missing, -1, np.arange(readings.size)))
             first = float(readings[np.argmin(missing)]) if self._last is None else self._last

@@ -1,4 +1,4 @@
-"""The file formats: every module of this folder that has a ``FORMAT``, and those of installed packages.
+"""The file formats: all modules of this folder with a ``FORMAT``, and those of installed packages.
 
 A package adds one by the entry-point group ``smartshoe.files`` (docs/extending.md).
 """
@@ -18,7 +18,7 @@ GROUP = "smartshoe.files"
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """All formats in the order in which a file is held against them.
+    """All formats in the order in which they are tried on a file.
 
     Raises `UsageError` where an installed package's format cannot be loaded, naming it.
     """

@@ -1,4 +1,4 @@
-"""What an HDF5 file itself holds: nothing that lies in another file, nothing larger than it can hold."""
+"""Safe access to an HDF5 file: no data from other files, no object larger than the file can hold."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from smartshoe.errors import FormatError
 from smartshoe.files.gate import foreign_code, limits, require_regular_file, require_values
 
 _DEEPEST = 32
-_OBJECTS_PER_COLUMN = 25  # groups, scales, strings and references beside the columns
+_OBJECTS_PER_COLUMN = 25  # allows for groups, scales, strings and references besides the columns
 
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_FIRST_PLACE = 512  # where a superblock may stand behind another format's header, and at each doubling
-_ADDRESSES_AT = {0: 24, 1: 28}  # of superblocks by version; from 2 on their checksums are checked
-_DRIVER = 3  # its address stands behind those of the base, the free space and the end
-_SUPERBLOCK = 160  # bytes, of the longest addresses; no whole file is shorter
+_FIRST_PLACE = 512  # a superblock behind another format's header is here, or at any doubling of this
+_ADDRESSES_AT = {0: 24, 1: 28}  # offset in superblocks by version; from version 2 on they have checksums
+_DRIVER = 3  # its address follows those of the base, the free space and the end
+_SUPERBLOCK = 160  # bytes, with the longest addresses; no complete file is shorter
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """The `h5py.File` at ``path``, read only; whatever HDF5 raises within the block is a `FormatError`."""
+    """The `h5py.File` at ``path``, read only; any error of HDF5 within the block becomes a `FormatError`."""
     import h5py
 
     require_regular_file(path)
@@ -33,9 +33,10 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 def _require_no_driver(path: Path) -> None:
-    """Raises `FormatError` where the superblock names a driver: one file of several, or 4 GB taken for a wrong length.
+    """Raise `FormatError` where the superblock names a driver: the file is part of several, or damaged.
 
-    HDF5 file format, II.A. The library takes as much memory as the driver's block says before it reads the block.
+    HDF5 file format, II.A. The library allocates as much memory as the driver's block declares, up to 4 GB, before it
+    reads the block.
     """
     with path.open("rb") as file:
         place, end, start = 0, path.stat().st_size, b""
@@ -44,7 +45,7 @@ def _require_no_driver(path: Path) -> None:
             start = file.read(_SUPERBLOCK)
             place = 2 * place or _FIRST_PLACE
     if not start.startswith(_SIGNATURE) or len(start) < _SUPERBLOCK or start[8] not in _ADDRESSES_AT:
-        return  # the library says what is wrong with it, if anything is
+        return  # if anything is wrong, the library reports it
     size = start[13]
     at = _ADDRESSES_AT[start[8]] + _DRIVER * size
     if start[at : at + size] != b"\xff" * size:
@@ -52,11 +53,11 @@ def _require_no_driver(path: Path) -> None:
 
 
 def vectors(path: Path, file: Any, *, deep: bool) -> list[tuple[str, Any]]:
-    """The numeric datasets (name, `h5py.Dataset`), with ``deep`` those of groups too (``group/name``).
+    """The numeric datasets (name, `h5py.Dataset`); with ``deep`` also those in groups (``group/name``).
 
     Raises `FormatError` for a link or a dataset whose data lie in another file (external links, external storage,
-    virtual datasets): a file from elsewhere must not choose what is opened here. Raises `InputError` where more is
-    declared than the limits or the file's size allow.
+    virtual datasets), since a file from outside must not choose which files are opened here. Raises `InputError` where
+    more is declared than the limits or the file's size allow.
     """
     import h5py
 
@@ -67,7 +68,7 @@ def vectors(path: Path, file: Any, *, deep: bool) -> list[tuple[str, Any]]:
         if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "biuf":
             continue
         _require_own_data(path, name, item)
-        # A chunk is unpacked whole, however little of it is asked for.
+        # A chunk is always unpacked completely, however little of it is requested.
         chunk = 1
         for length in item.chunks or ():
             chunk *= length
@@ -96,7 +97,7 @@ def _objects(path: Path, group: Any, *, deep: bool) -> Iterator[tuple[str, Any]]
                     f"{path}: {prefix + name!r} is a link to another file: write a file that holds its own data"
                 )
             if not isinstance(link, h5py.HardLink):
-                continue  # a soft link leads to what is met by its own name
+                continue  # the target of a soft link is found under its own name
             item = current[name]
             if isinstance(item, h5py.Group):
                 key = h5py.h5o.get_info(item.id).addr

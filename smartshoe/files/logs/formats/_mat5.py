@@ -1,7 +1,7 @@
-"""What a MAT-file of level 5 to 7 holds, weighed before scipy unpacks it: bytes, depth, number of arrays.
+"""Checks a MAT-file of level 5 to 7 before scipy unpacks it: bytes, depth, number of arrays.
 
-A compressed variable may unpack to a thousand times its size, and scipy's compiled reader follows cells in cells until
-the stack ends. Layout: MathWorks, MAT-File Format (level 5): tags of type and length, arrays in arrays.
+A compressed variable may unpack to a thousand times its size, and scipy's compiled reader follows nested cells until
+the stack overflows. Layout: MathWorks, MAT-File Format (level 5): tags of type and length, arrays in arrays.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from smartshoe.files.gate.limits import FREELY_UNPACKED
 
 _HEADER_BYTES = 128
 _MATRIX, _COMPRESSED, _DIMENSIONS, _FLAGS = 14, 15, 5, 6
-_OF_ARRAYS = (1, 2, 3)  # cells, structs, objects
+_OF_ARRAYS = (1, 2, 3)  # classes that contain arrays: cells, structs, objects
 _DEEPEST = 32
 _ARRAYS_PER_COLUMN = 25
 _FREE_CELLS = 1024
 
 
 def require_bounded(path: Path) -> None:
-    """Raise `InputError` where the level 5 file at ``path`` unpacks to more than the limits, or is nested too deep."""
+    """Raise `InputError` where the level 5 file at ``path`` unpacks to more than the limits or is nested too deeply."""
     content = path.read_bytes()
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if order is None:
-        return  # level 4, which holds plain matrices only, or no MAT-file
+        return  # level 4, which only contains plain matrices, or no MAT-file
     left = max(FREELY_UNPACKED, limits().expansion * len(content))
     arrays = 0
     for kind, body in _elements(memoryview(content)[_HEADER_BYTES:], order):
@@ -50,7 +50,7 @@ def require_bounded(path: Path) -> None:
 
 
 def _weighed(path: Path, body: memoryview, order: str, depth: int) -> int:
-    """How many arrays lie in ``body``, at any depth; raises where one declares what cannot be in it."""
+    """The number of arrays in ``body``, at any depth; raises where one declares more than it can contain."""
     arrays, waiting = 0, [(body, depth)]
     while waiting:
         here, depth = waiting.pop()
@@ -71,11 +71,11 @@ def _weighed(path: Path, body: memoryview, order: str, depth: int) -> int:
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
-    """The elements (type, content) that stand one after the other in ``data``; a cut one ends it."""
+    """The successive elements (type, content) in ``data``; ends at an incomplete one."""
     at = 0
     while at + 8 <= len(data):
         kind, length = struct.unpack_from(f"{order}II", data, at)
-        if kind >> 16:  # a small element: its content stands in the tag
+        if kind >> 16:  # a small element: its content is in the tag
             yield kind & 0xFFFF, data[at + 4 : at + 4 + min(kind >> 16, 4)]
             at += 8
             continue

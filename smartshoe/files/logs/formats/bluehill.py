@@ -1,7 +1,7 @@
-"""Bluehill raw-data CSV of Instron's testing machines, in the dialects that its locales and versions write.
+"""Bluehill raw-data CSV of Instron's testing machines, in the dialects of its locales and versions.
 
-Up to 24 and more lines ``Section : name;value;unit``, a row of names in any language, below it a row of units in
-brackets, then numbers. The unit row is what the format is recognised by; the columns are recognised by their units.
+Up to 24 or more lines ``Section : name;value;unit``, a row of names in any language, below it a row of units in
+brackets, then numbers. The format is recognised by the row of units; the columns are recognised by their units.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _unit_row(lines: Sequence[str]) -> tuple[int, str] | None:
 
 
 def sniff(path: Path, head: bytes) -> bool:
-    """Whether a row of names with a row of units in brackets below it stands near the beginning."""
+    """Whether there is a row of names with a row of units in brackets below it near the beginning."""
     return is_text(head) and _unit_row(head_lines(head)) is not None
 
 
@@ -65,7 +65,7 @@ def _preamble(lines: Sequence[str], delimiter: str) -> dict[str, str]:
 def read(path: Path) -> Sheet:
     """Read a Bluehill log.
 
-    Raises `FormatError` naming the lines where cells are no numbers or contradict each other in their decimal mark.
+    Raises `FormatError` naming the lines where cells are not numbers or contradict each other in their decimal mark.
     """
     lines, notes = read_lines(path)
     found = _unit_row(lines)
@@ -82,7 +82,7 @@ def read(path: Path) -> Sheet:
     names, units = ([*row, *[""] * width][:width] for row in (names, units))
     require_columns(path, width)
     rows = even_rows(path, rows, numbers, width)
-    # A column that only numbers the rows, or is blank throughout, has neither name nor unit.
+    # A column of row numbers, or an entirely blank one, has neither name nor unit.
     used = [index for index in range(width) if names[index] or units[index] or any(row[index] for row in rows)]
     rows = [[row[index] for index in used] for row in rows]
     names = [names[index] or f"column {index + 1}" for index in used]
@@ -92,7 +92,7 @@ def read(path: Path) -> Sheet:
         Column(name, (match[1].strip() if (match := _BRACKETED.fullmatch(text)) else ""), values)
         for name, text, values in zip(names, texts, table.columns, strict=True)
     ]
-    # Somebody may have written lines of a plain table above the export.
+    # A user may have added lines of a plain table above the export.
     marks = [line for line in lines[: at - 1] if line.startswith("#") and ":" in line]
     said = {key: "\n".join(values) for key, values in remarks(marks).items()}
     recording_name, unit_name = (said.pop(key, None) for key in ("name", "unit"))
@@ -127,11 +127,11 @@ def write_bluehill(  # noqa: PLR0913 - a public verb
     names: Sequence[str] | None = None,
     digits: int | None = None,
 ) -> None:
-    """Write time, displacement and load as Bluehill would: names, units in brackets, numbers.
+    """Write time, displacement and load like Bluehill: names, units in brackets, numbers.
 
-    ``preamble`` holds (``Section : name``, value, unit); ``names`` replaces Time, Extension, Load (channels that
-    the recording lacks are left out, others follow by their names); ``digits`` after the decimal mark, or None for
-    full precision. An encoding with a byte order mark (``utf-16``, ``utf-8-sig``) writes it.
+    ``preamble`` holds (``Section : name``, value, unit); ``names`` replaces Time, Extension, Load (channels that the
+    recording lacks are left out, others follow by their names); ``digits`` after the decimal mark, or None for full
+    precision. An encoding with a byte order mark (``utf-16``, ``utf-8-sig``) writes the mark.
     """
     order = {"auxiliary": 1, "load": 2, "command": 3, "sensor": 4}
     channels = sorted(recording.channels.values(), key=lambda c: 0 if c.name == "displacement" else order[c.role])

@@ -1,4 +1,4 @@
-"""C3D, the motion laboratories' format: its analog channels, the gait events as remarks. Read by ezc3d."""
+"""C3D, the motion laboratories' format: its analog channels, with the gait events as remarks. Read by ezc3d."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path) -> Sheet:
-    """Every analog channel at its own rate; ``events SIDE WHAT`` among the remarks are times in s, from the start.
+    """Every analog channel at its own rate; remarks ``events SIDE WHAT`` are event times in s from the start.
 
     Raises `InputError` where the library ezc3d is not installed, `FormatError` where there is no analog channel.
     """
@@ -60,7 +60,7 @@ def _texts(group: Any, key: str, count: int) -> list[str]:
 
 
 def _events(parameters: Any) -> dict[str, str]:
-    """Times in s of the events by side and label; C3D keeps minutes and seconds."""
+    """Times in s of the events by side and label; C3D stores minutes and seconds."""
     if "EVENT" not in parameters or "TIMES" not in parameters["EVENT"]:
         return {}
     group = parameters["EVENT"]

@@ -1,4 +1,4 @@
-"""Any other delimited text: with a header or without, with units in the header, below it, or not at all."""
+"""Any other delimited text: with or without a header, with units in the header, below it, or nowhere."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from smartshoe.files.logs._text import bracketed, even_rows, is_text, read_lines
 from smartshoe.recording import split_column
 from smartshoe.units import ONE, find_unit
 
-_DELIMITERS = ("\t", ";", ",", None)  # None: any run of blanks
+_DELIMITERS = ("\t", ";", ",", None)  # None is any run of blanks
 _SAMPLE_LINES = 200
 _LEAST_SCORE = 0.2  # share of cells that must be numbers for text to be a table
 _AFTER_SLASH = re.compile(r"(.*\S)\s*/\s*([^/\s]+)")
@@ -34,12 +34,12 @@ def _without_trailing(cells: list[str]) -> list[str]:
 
 
 def _is_number(cell: str) -> bool:
-    """Whether a cell is a number, with its unit or without."""
+    """Whether a cell is a number, with or without a unit."""
     return is_number(cell) or bool(split_unit(cell)[1])
 
 
 def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, list[list[str]]]:
-    """The delimiter under which most cells of the later lines are numbers, and the rows that are as most are."""
+    """The delimiter by which most cells of the later lines are numbers, and the rows of the most frequent width."""
     best: tuple[float, str | None, list[list[str]]] | None = None
     for delimiter in _DELIMITERS:
         rows = split_cells(lines, delimiter)
@@ -83,7 +83,7 @@ def _is_unit_row(cells: Sequence[str]) -> bool:
 
 
 def _said(lines: Sequence[str], delimiter: str | None) -> dict[str, str]:
-    """What lines above a table say: ``key=value``, ``# key: value``, ``key<delimiter>value``."""
+    """Metadata in the lines above a table: ``key=value``, ``# key: value``, ``key<delimiter>value``."""
     metadata: dict[str, str] = {}
     for number, line in enumerate(lines, start=1):
         text = line.strip().lstrip("#").strip()
@@ -106,11 +106,11 @@ def _split_table(path: Path, lines: list[str]) -> tuple[str | None, int, int]:
     filled = [line for line in lines if line.strip()]
     if not filled:
         raise InputError(f"{path} is empty: give a file with samples in it")
-    # Lines further down are of the table, whatever stands above it.
+    # Lines further down belong to the table, whatever is above it.
     sample = filled[len(filled) // 2 :][:_SAMPLE_LINES]
     delimiter, rows = _delimiter(path, sample)
     width = len(rows[0])
-    # Rows end with a delimiter, or with a cell that is empty in all of them: what stands above them tells.
+    # All rows end with a delimiter or with an empty cell: the lines above tell which.
     ends_empty = not any(row[-1] for row in rows)
     for index, line in enumerate(lines):
         cells = split_cells([line], delimiter)[0] if line.strip() else [""]
@@ -125,7 +125,7 @@ def _split_table(path: Path, lines: list[str]) -> tuple[str | None, int, int]:
 
 
 def read(path: Path) -> Sheet:
-    """Read delimited text; raises `FormatError` naming lines that do not fit or contradict each other."""
+    """Read delimited text; raises `FormatError` naming lines that do not match or contradict each other."""
     lines, notes = read_lines(path)
     delimiter, width, start = _split_table(path, lines)
     require_columns(path, width)

@@ -1,4 +1,4 @@
-"""HDF5 in netCDF-4's layout, so that MATLAB's h5read and xarray (h5netcdf) open it."""
+"""HDF5 in the layout of netCDF-4, so that MATLAB's h5read and xarray (h5netcdf) can open it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from smartshoe.recording import Recording
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _OWN = "smartshoe.recording/1"
-_LONGEST_TEXT = 10_000  # of an attribute that others wrote
+_LONGEST_TEXT = 10_000  # characters of another writer's attribute
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -57,7 +57,7 @@ def read(path: Path) -> Sheet:
 
 
 def _text(value: Any) -> str:
-    """An attribute as text: one of bytes or of one element too, as other writers store it."""
+    """An attribute as text; accepts bytes and arrays of one element, as other writers store it."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.reshape(-1)[0]
     if isinstance(value, bytes):
@@ -66,10 +66,13 @@ def _text(value: Any) -> str:
 
 
 def write(recording: Recording, path: Path) -> None:
-    """Dimension and coordinate ``time`` in s, one variable a channel with ``units`` and ``role``, NaN where missing."""
+    """Write dimension and coordinate ``time`` in s, and a variable per channel with ``units`` and ``role``.
+
+    Missing samples are NaN.
+    """
     import h5netcdf
 
-    # Made in memory: HDF5 on a full disk ends in a segmentation fault.
+    # Built in memory, since HDF5 on a full disk ends in a segmentation fault.
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
         file.attrs["schema"] = _OWN
@@ -80,7 +83,7 @@ def write(recording: Recording, path: Path) -> None:
         file.attrs["channels"] = json.dumps(list(recording.channels), ensure_ascii=False)
         file.dimensions = {"time": len(recording)}
         time = file.create_variable("time", ("time",), data=recording.time_s)
-        # Not 's' alone: xarray takes that for a duration and would turn the numbers into timedelta64.
+        # Not 's' alone: xarray takes that as a duration and would convert the numbers to timedelta64.
         time.attrs["units"] = "s"
         for channel in recording.channels.values():
             variable = file.create_variable(channel.name, ("time",), data=channel.with_nan(), fillvalue=np.nan)

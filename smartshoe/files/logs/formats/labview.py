@@ -16,7 +16,7 @@ from smartshoe.recording import Recording, Role
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
-# Keys of the header that say how the file is laid out, not what was measured.
+# Keys of the header that describe the file's layout, not the measurement.
 _LAYOUT = {"LabVIEW Measurement", "Writer_Version", "Reader_Version", "Separator", "Decimal_Separator",
            "Multi_Headings", "X_Columns", "Time_Pref"}  # fmt: skip
 _SEPARATORS = {"tab": "\t", "comma": ",", "space": " "}
@@ -35,7 +35,7 @@ def _text(path: Path) -> str:
 
 
 def _decimal_mark(path: Path, declared: str | None, rows: list[tuple[int, list[str]]], numeric: int) -> str:
-    """The mark that the data's cells use; refused with line numbers where they use both or contradict the header."""
+    """The decimal mark of the data's cells; raises with line numbers where they use both or contradict the header."""
     first: dict[str, int] = {}
     for line, cells in rows:
         for cell in cells[:numeric]:
@@ -67,13 +67,13 @@ def _number(text: str, mark: str, path: Path, line: int, column: str) -> float:
 
 
 def _spread(cells: list[str], channels: int, multi: bool) -> list[str]:
-    """A header row's cells, one a channel (with X_Columns Multi every second one)."""
+    """A header row's cells, one per channel (every second cell with X_Columns Multi)."""
     return [cells[k * 2 if multi else k] if (k * 2 if multi else k) < len(cells) else "" for k in range(channels)]
 
 
 @dataclass(frozen=True)
 class _SegmentLayout:
-    """How the file says that its cells are to be read; ``width`` cells make a row of ``channels`` signals."""
+    """How the file's cells are to be read; ``width`` cells make a row of ``channels`` signals."""
 
     path: Path
     separator: str
@@ -88,14 +88,14 @@ class _SegmentLayout:
         return 2 * channels if self.is_multi else channels + 1
 
     def signals(self, channels: int) -> list[int]:
-        """The cells of a row that are signals; the others are times."""
+        """Indices of the cells of a row that are signals; the others are times."""
         return [(2 * k + 1 if self.is_multi else k + 1) for k in range(channels)]
 
 
 def read(path: Path) -> Sheet:
-    """One segment (or several with the same channels, one after the other) as columns, time first.
+    """One segment (or several with the same channels, concatenated) as columns, time first.
 
-    Raises `FormatError` with the line for a truncated header, marks that are mixed or cells that are no numbers.
+    Raises `FormatError` with the line for a truncated header, mixed decimal marks or cells that are not numbers.
     """
     lines = _text(path).splitlines()
     general, at = _general_header(path, lines)
@@ -120,7 +120,7 @@ def read(path: Path) -> Sheet:
 
 
 def _general_header(path: Path, lines: list[str]) -> tuple[dict[str, str], int]:
-    """What the file says of all segments, and the index of the line below it."""
+    """The header that applies to all segments, and the index of the line below it."""
     general: dict[str, str] = {}
     for at, line in enumerate(lines):
         if line.startswith(_END):
@@ -209,7 +209,7 @@ def _segment_header(layout: _SegmentLayout, lines: list[str], at: int) -> tuple[
 def _rows(
     layout: _SegmentLayout, lines: list[str], at: int, width: int, header: dict[str, list[str]]
 ) -> tuple[list[tuple[int, list[str]]], list[str], int]:
-    """The rows (line, cells) up to the next segment or blank line, what the Comment column says, the index below."""
+    """The rows (line, cells) up to the next segment or blank line, the texts of the Comment column, the index below."""
     rows: list[tuple[int, list[str]]] = []
     comments: list[str] = []
     while at < len(lines) and lines[at].strip():
@@ -248,7 +248,7 @@ def _cell(text: str, path: Path) -> float:
 
 
 def write(recording: Recording, path: Path) -> None:
-    """Version 2, X_Columns One, decimal point; missing samples are empty cells."""
+    """Write version 2 with X_Columns One and a decimal point; missing samples are empty cells."""
     channels = list(recording.channels.values())
     count = len(channels)
 

@@ -14,10 +14,10 @@ from smartshoe.files.logs._sheet import Column, Format, Sheet
 
 _SENSOR = re.compile(r"(?P<serial>\w+)-(?P<side>[LR])(::(?P<part>\w+))?")
 _SIDES = {"L": "left", "R": "right"}
-# The insole has no unit under toe or metatarsals: its front zones bear what lies above them.
+# The insole has no unit under toe or metatarsals: its front zones measure whatever is above them.
 _ZONES = {"heel": "heel", "medial": "meta1", "lateral": "meta4", None: "total"}
 _PREAMBLE = 4
-_LOST_N = -1.0  # what a zone holds where a packet did not arrive; the total is 0 there
+_LOST_N = -1.0  # value of a zone whose packet did not arrive; the total is 0 there
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -25,12 +25,12 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path) -> Sheet:
-    """Every column, on the first insole's clock; raises `FormatError` with the line at fault."""
+    """Every column, on the first insole's clock; raises `FormatError` with the faulty line."""
     lines = lines_of(path)
     if len(lines) < _PREAMBLE:
         raise FormatError(f"{path}, line {len(lines)}: the header has no end: export it again")
     names, units = lines[2].split("\t"), lines[3].split("\t")
-    # The column behind the last unit holds remarks.
+    # The column after the last unit contains remarks.
     width = max((k + 1 for k, unit in enumerate(units[: len(names)]) if unit.strip()), default=0)
     table = numbers_below(path, lines, _PREAMBLE, width, "\t")
     clocks = [k for k in range(width) if units[k].strip().casefold().startswith("time")]
@@ -72,9 +72,9 @@ def read(path: Path) -> Sheet:
 
 
 def _even(time_s: Array) -> Array:
-    """Times (n,) without the steps of 0 and 2 that the program's rounding leaves in an even row of them.
+    """Evenly spaced times (n,), freed of the steps of 0 and 2 sampling times that the program's rounding causes.
 
-    As they are where a sample is further off than that: then the row is not even, and its times stay as they are.
+    Unchanged where a time is further off than rounding explains, since the sampling is then not even.
     """
     step_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
     even = time_s[0] + step_s * np.arange(time_s.size)
@@ -82,7 +82,7 @@ def _even(time_s: Array) -> Array:
 
 
 def _lost(names: list[str], table: Array) -> dict[str, Mask]:
-    """(rows,) by side: whether a zone of that insole says that its packet did not arrive."""
+    """For each side, a mask (rows,) of the samples where a zone of that insole marks a lost packet."""
     lost = {side: np.zeros(len(table), dtype=bool) for side in _SIDES.values()}
     for k, name in enumerate(names):
         found = _SENSOR.fullmatch(name.strip())

@@ -1,4 +1,4 @@
-"""MATLAB MAT-files: level 5 to 7 by scipy, 7.3 (HDF5) by h5py. Nothing is ever unpickled."""
+"""MATLAB MAT-files: level 5 to 7 by scipy, 7.3 (HDF5) by h5py. No object is unpickled."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _flatten(name: str, value: Any) -> list[tuple[str, np.ndarray]]:
-    """Numeric arrays of a variable, structs opened up as NAME.FIELD, matrices as NAME:1, NAME:2, ..."""
+    """Numeric arrays of a variable: structs are expanded as NAME.FIELD, matrices as NAME:1, NAME:2, ..."""
     array = np.asarray(value)
     if array.dtype.names:
         item = array.reshape(-1)[0] if array.size else None
@@ -46,7 +46,7 @@ def _flatten(name: str, value: Any) -> list[tuple[str, np.ndarray]]:
 
 
 def _is_hdf5(path: Path) -> bool:
-    """Whether it is level 7.3: HDF5, in MATLAB's own files below a header of 512 bytes."""
+    """Whether the file is of level 7.3, which is HDF5, in MATLAB's own files after a header of 512 bytes."""
     with path.open("rb") as file:
         head = file.read(512 + len(_HDF5))
     return head.startswith(_HDF5) or head.endswith(_HDF5)
@@ -73,8 +73,8 @@ def _load_hdf5(path: Path) -> dict[str, Any]:
 def read(path: Path) -> Sheet:
     """Vectors of one length as columns: the longest length that more than one vector has, else the longest.
 
-    Others are left out with a note. A scalar ``Ts`` (sample time) or ``fs`` (rate) gives a time column where no
-    vector is called time.
+    Others are left out with a note. A scalar ``Ts`` (sample time) or ``fs`` (rate) gives a time column if no vector is
+    called time.
     """
     loaded = _load(path)
     about = loaded.pop("smartshoe", None)
@@ -99,7 +99,7 @@ def read(path: Path) -> Sheet:
 
 
 def _own_columns(sheet: Sheet, about: Any, vectors_: list[tuple[str, np.ndarray]]) -> list[Column]:
-    """The columns as `write` described them; what is damaged there raises whatever it raises."""
+    """The columns as `write` described them; a damaged description may raise anything."""
     own = parsed_json(str(np.asarray(about).item()))
     sheet.recording_name, sheet.unit_name = own["name"], own["unit"]
     sheet.metadata.update(own["metadata"])
@@ -116,7 +116,7 @@ def _column(name: str, values: np.ndarray) -> Column:
 
 
 def _sampled(arrays: list[tuple[str, np.ndarray]], length: int) -> list[Column]:
-    """A time column from the scalars Ts or fs, where no vector is the time."""
+    """A time column from the scalars Ts or fs, for use where no vector is the time."""
     if any(name.rsplit(".", 1)[-1].casefold() in ("t", "time", "time_s") for name, values in arrays if values.size > 1):
         return []
     scalars = {name.casefold(): float(values[0]) for name, values in arrays if values.size == 1}
@@ -127,7 +127,7 @@ def _sampled(arrays: list[tuple[str, np.ndarray]], length: int) -> list[Column]:
 
 
 def write(recording: Recording, path: Path) -> None:
-    """Variables named as a plain table's columns, and ``smartshoe``: a JSON text with name, unit, roles, metadata."""
+    """Write variables named like a plain table's columns, and ``smartshoe``: JSON with name, unit, roles, metadata."""
     from scipy.io import savemat
 
     columns: dict[str, Any] = {"time_s": {"name": "time", "unit": "s", "role": None}}
@@ -135,7 +135,7 @@ def write(recording: Recording, path: Path) -> None:
     for index, channel in enumerate(recording.channels.values()):
         name = column_name(channel)
         if not (name.isidentifier() and name.isascii() and len(name) <= 63 and not name.startswith("_")):
-            name = f"channel_{index + 1}"  # MATLAB's names are letters, digits and _ only
+            name = f"channel_{index + 1}"  # MATLAB's names consist of letters, digits and _ only
         variables[name] = channel.with_nan()[:, None]
         columns[name] = {"name": channel.name, "unit": channel.unit.symbol, "role": channel.role}
     about = {

@@ -1,4 +1,4 @@
-"""The text export of Moticon's OpenGo insoles: sixteen pressures, total force and centre of pressure of each foot."""
+"""The text export of Moticon's OpenGo insoles: for each foot sixteen pressures, total force and centre of pressure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path) -> Sheet:
-    """Every column; pressures in kPa; raises `FormatError` with the line at fault."""
+    """Every column, pressures in kPa; raises `FormatError` with the faulty line."""
     lines = lines_of(path)
     at = next((k for k, line in enumerate(lines) if line.startswith(_HEADER)), None)
     if at is None:

@@ -1,4 +1,4 @@
-"""OpenSim's motion and storage files (.mot, .sto): forces, points of application and torques of plates."""
+"""OpenSim's motion and storage files (.mot, .sto): forces, points of application and torques of force plates."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path) -> Sheet:
-    """Every column; none is a load or a sensor before the user says so. Raises `FormatError` with the line."""
+    """Every column; none is a load or a sensor unless the user says so. Raises `FormatError` with the faulty line."""
     lines = lines_of(path)
     end = next((k for k, line in enumerate(lines) if line.strip().casefold() == _END), None)
     if end is None:

@@ -1,4 +1,7 @@
-"""Parquet, one column a channel: for pandas, Polars, DuckDB, MATLAB's ``parquetread``; needs the extra ``parquet``."""
+"""Parquet, one column per channel: for pandas, Polars, DuckDB, MATLAB's ``parquetread``.
+
+Needs the extra ``parquet``.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,7 @@ def _library(path: Path) -> Any:
 
 
 def read(path: Path) -> Sheet:
-    """Every numeric column; units from the names (``force_n``) where the file is not our own."""
+    """Every numeric column; units come from the names (``force_n``) unless the file is our own."""
     arrow = _library(path)
     declared = arrow.parquet.read_metadata(path)
     require_columns(path, declared.num_columns)
@@ -75,7 +78,10 @@ def _described(path: Path, about: bytes) -> dict[str, Any]:
 
 
 def write(recording: Recording, path: Path) -> None:
-    """``time_s`` and one ``name_unit`` column a channel, null where missing; names, units and roles in the metadata."""
+    """Write ``time_s`` and one ``name_unit`` column per channel, null where missing.
+
+    The metadata hold units and roles.
+    """
     arrow = _library(path)
     arrays = {"time_s": arrow.array(recording.time_s)}
     channels: dict[str, dict[str, str]] = {}

@@ -1,7 +1,8 @@
 """The text export of novel's pedar insoles (.asc): 99 pressures in kPa of each foot, left before right.
 
-The export has no areas and no places of its sensors: which of them lie under the heel depends on the insole, so that
-none is a unit of a shoe before the user says so. Layout after the readers of pressuRe (Telfer) and pedarProbe.
+The export gives neither areas nor positions of its sensors, and which of them lie under the heel depends on the insole.
+Therefore none is a unit of a shoe unless the user says so. Layout after the readers of pressuRe (Telfer) and
+pedarProbe.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from smartshoe.errors import FormatError
 from smartshoe.files.logs._exported import lines_of, numbers_below
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 
-SENSORS = 99  # of an insole
+SENSORS = 99  # in an insole
 _RATE = re.compile(rb"\[Hz\]\s*:")
-_MOST_LINES = 30  # above the numbers
+_MOST_LINES = 30  # lines above the numbers, at most
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -23,7 +24,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path) -> Sheet:
-    """Time and every sensor as ``left_1`` to ``right_99`` in kPa; raises `FormatError` with the line at fault."""
+    """Time and every sensor as ``left_1`` to ``right_99`` in kPa; raises `FormatError` with the faulty line."""
     lines = lines_of(path)
     named = next((k for k, line in enumerate(lines[:_MOST_LINES]) if line.casefold().startswith("time")), None)
     if named is None:

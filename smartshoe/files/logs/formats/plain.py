@@ -29,7 +29,7 @@ _CHUNK = 1 << 24
 
 
 def sniff(path: Path, head: bytes) -> bool:
-    """Whether the first line that is no remark is a header with a column ``time_s``."""
+    """Whether the first line that is not a remark is a header with a column ``time_s``."""
     if not is_text(head):
         return False
     lines = [line for line in head_lines(head) if line.strip() and not line.startswith("#")]
@@ -55,7 +55,7 @@ def _quoted(text: str, *, key: bool = False) -> str:
 
 
 def remarks(lines: list[str]) -> dict[str, list[str]]:
-    """The values of every key in ``# key: value`` lines; a line without a colon stands under ``comment``."""
+    """The values of every key in ``# key: value`` lines; a line without a colon is listed under ``comment``."""
     found: dict[str, list[str]] = {}
     for line in lines:
         match = _KEY_VALUE.fullmatch(line)
@@ -65,7 +65,7 @@ def remarks(lines: list[str]) -> dict[str, list[str]]:
 
 
 def _opening(path: Path) -> tuple[list[str], list[str], int]:
-    """The remark lines, the header's cells and the header's 1-based line."""
+    """The remark lines, the header's cells and the header's 1-based line number."""
     marks: list[str] = []
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -91,7 +91,7 @@ def _chunks(path: Path, skip_lines: int) -> Iterator[bytes]:
 
 
 def _marks(path: Path, skip_lines: int) -> tuple[int, int]:
-    """How many commas and how many lines stand below the header."""
+    """The number of commas and of lines below the header."""
     commas = lines = 0
     last = b"\n"
     for chunk in _chunks(path, skip_lines):
@@ -102,10 +102,10 @@ def _marks(path: Path, skip_lines: int) -> tuple[int, int]:
 
 
 def _read_fast(path: Path, header: list[str], header_line: int) -> Array | None:
-    """All cells (rows, columns) by pandas' C parser, or None where only the slow pass can say what is wrong."""
+    """All cells (rows, columns) by pandas' C parser, or None where the slow pass must find the fault."""
     import pandas as pd
 
-    # Up to 3.0 pandas' default parser may miss the last bit; from 3.1 on it does not and deprecates the option.
+    # Up to 3.0 pandas' default parser may be off by the last bit; from 3.1 on it is exact and deprecates the option.
     exact = tuple(int(part) for part in pd.__version__.split(".")[:2]) >= (3, 1)
     try:
         with warnings.catch_warnings():
@@ -136,9 +136,9 @@ def _data_lines(path: Path, header_line: int) -> tuple[list[str], list[int]]:
 
 
 def _read_slowly(path: Path, header: list[str], header_line: int) -> tuple[Array, list[int]]:
-    """The same by way of every cell, raising `FormatError` at the first one that is at fault.
+    """All cells, read one by one, raising `FormatError` at the first faulty one.
 
-    And which columns (indices into ``header``) it has: those of dates or times of day, which loggers write beside
+    Also the columns kept, as indices into ``header``: columns of dates or times of day, which loggers write beside
     ``time_s``, are left out.
     """
     lines, numbers = _data_lines(path, header_line)
@@ -160,14 +160,14 @@ def _read_slowly(path: Path, header: list[str], header_line: int) -> tuple[Array
 
 
 def read(path: Path) -> Sheet:
-    """Read a plain table; raises `FormatError` naming line and column of what does not fit."""
+    """Read a plain table; raises `FormatError` naming line and column of any fault."""
     marks, header, header_line = _opening(path)
     require_columns(path, len(header))
     twice = [cell for cell, count in Counter(header).items() if count > 1]
     if twice:
         raise FormatError(f"{path}, line {header_line} names column {twice[0]!r} twice: rename one")
     commas, line_count = _marks(path, header_line)
-    # More cells than the header names are for the slow pass to find: pandas takes minutes for a line of millions.
+    # Rows with more cells than the header are left to the slow pass: pandas takes minutes for a line of millions.
     fits = commas <= line_count * (len(header) - 1)
     values = _read_fast(path, header, header_line) if fits else None
     notes = []
@@ -180,7 +180,7 @@ def read(path: Path) -> Sheet:
     if values.shape[0] == 0:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
     numbers = None
-    if line_count != values.shape[0]:  # blank lines between
+    if line_count != values.shape[0]:  # there are blank lines in between
         numbers = np.array(_data_lines(path, header_line)[1], dtype=np.intp)
 
     said = remarks(marks)
@@ -216,12 +216,12 @@ def read(path: Path) -> Sheet:
 
 
 def _is_foreign(channel: Channel) -> bool:
-    """Whether its column's ending does not say its unit, as of one that the table of units does not know."""
+    """Whether a column's suffix would not give its unit, because the table of units lacks it."""
     return bool(channel.unit.symbol) and split_column(column_name(channel))[1] != channel.unit
 
 
 def write(recording: Recording, path: Path) -> None:
-    """Write ``recording`` with every number in its shortest exact form and missing samples as empty cells."""
+    """Write ``recording`` with every number in its shortest exact form, and missing samples as empty cells."""
     import pandas as pd
 
     lines = [("name", recording.name)]
@@ -229,12 +229,12 @@ def write(recording: Recording, path: Path) -> None:
         lines.append(("unit", recording.unit))
     lines += [(key, value) for key, value in recording.metadata.items() if key not in ("name", "unit")]
     channels = list(recording.channels.values())
-    # The reader tells roles and units from the names as they will stand in the header.
+    # The reader infers roles and units from the names in the header.
     split = [(c.name, c.unit) if _is_foreign(c) else split_column(column_name(c)) for c in channels]
     lines += [(f"unit {column_name(channel)}", channel.unit.symbol) for channel in channels if _is_foreign(channel)]
     units = [unit for _, unit in split]
     roles = roles_of([name for name, _ in split], units)
-    only = only_reading(roles, units)  # it would be the reading if nothing said what it is
+    only = only_reading(roles, units)  # would be taken as the reading unless its role is stated
     lines += [
         (f"role {column_name(channel)}", channel.role)
         for at, (channel, role) in enumerate(zip(channels, roles, strict=True))

@@ -1,4 +1,4 @@
-"""NI TDMS files, by npTDMS."""
+"""NI TDMS files, read and written by npTDMS."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _numbers(values: Any) -> np.ndarray | None:
-    """A channel's values as float64; time stamps in seconds from the first one; None where they are no numbers."""
+    """A channel's values as float64; time stamps in seconds from the first one; None where they are not numbers."""
     array = np.asarray(values)
     if array.dtype.kind == "M":
         nanoseconds = array.astype("datetime64[ns]").astype(np.int64)
@@ -36,7 +36,7 @@ def _numbers(values: Any) -> np.ndarray | None:
 
 @dataclass(frozen=True, eq=False)
 class _Signal:
-    """A channel with numbers; ``timing`` is (start, step) in s of a waveform, None for a channel that is none."""
+    """A numeric channel; ``timing`` is (start, step) in s of a waveform, None for other channels."""
 
     group: str
     name: str
@@ -69,7 +69,7 @@ def read(path: Path) -> Sheet:
 
 
 def _loaded(path: Path) -> tuple[Mapping[str, Any], list[tuple[str, Any]]]:
-    """The file's properties and its channels (group, channel), once what they declare has been weighed."""
+    """The file's properties and its channels (group, channel), after checking the sizes that they declare."""
     from nptdms import TdmsFile
 
     with path.open("rb") as content:
@@ -83,7 +83,7 @@ def _loaded(path: Path) -> tuple[Mapping[str, Any], list[tuple[str, Any]]]:
 
 
 def _numeric(path: Path, channels: list[tuple[str, Any]], notes: list[str]) -> list[_Signal]:
-    """The channels that hold numbers; raises `FormatError` where there is none, or where our own file is cut."""
+    """The numeric channels; raises `FormatError` where there is none, or where a file of our own is truncated."""
     taken = [(group, channel, _numbers(channel[:])) for group, channel in channels]
     left_out = [channel.name for _, channel, values in taken if values is None]
     if left_out:
@@ -115,7 +115,7 @@ def _timing(channel: Any) -> tuple[float, float] | None:
 
 
 def _at_one_rate(signals: list[_Signal], notes: list[str]) -> list[_Signal]:
-    """Without decimated copies beside the data (LabVIEW SignalExpress): the channels that go with the longest stay."""
+    """The channels at the sample time of the longest one; decimated copies (LabVIEW SignalExpress) are left out."""
     if len({signal.timing for signal in signals} - {None}) <= 1:
         return signals
     longest = max(signals, key=lambda signal: signal.values.size).timing
@@ -147,7 +147,7 @@ def _columns(signals: list[_Signal], length: int) -> Iterator[Column]:
 
 
 def write(recording: Recording, path: Path) -> None:
-    """One group with a time channel and one channel a signal; missing samples are NaN."""
+    """Write one group with a time channel and one channel per signal; missing samples are NaN."""
     from nptdms import ChannelObject, RootObject, TdmsWriter
 
     properties = {**recording.metadata, "smartshoe_name": recording.name}

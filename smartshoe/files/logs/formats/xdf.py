@@ -1,4 +1,4 @@
-"""XDF files of the Lab Streaming Layer's recorder, by pyxdf: one numeric stream with its channels' names and units."""
+"""XDF files recorded by the Lab Streaming Layer, read by pyxdf: one numeric stream with channel names and units."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def _sniff(path: Path, head: bytes) -> bool:
 def read(path: Path) -> Sheet:
     """The numeric stream with the most samples, on the recorder's synchronised clock, from its first sample on.
 
-    Other streams are named in the notes, markers with their number. Raises `InputError` where pyxdf is missing,
-    `FormatError` where the file holds no numeric stream.
+    Other streams are named in the notes, markers with their number. Raises `InputError` where pyxdf is not installed,
+    `FormatError` where the file has no numeric stream.
     """
     try:
         import pyxdf
@@ -60,7 +60,7 @@ def _text(info: Any, key: str) -> str:
 
 
 def _channels(info: Any, count: int) -> list[tuple[str, str]]:
-    """Label and unit of each channel; its 1-based number where the description does not say."""
+    """Label and unit of each channel; its 1-based number where the description gives no label."""
     try:
         described = info["desc"][0]["channels"][0]["channel"]
     except (KeyError, IndexError, TypeError):
