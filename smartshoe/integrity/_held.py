@@ -261,7 +261,7 @@ def _load_rate(view: View, starts: Index, stops: Index) -> Array:
     by_halves -= (noise / np.sqrt(view.near) + view.load.step) / half
     length = np.maximum(last - first, 1)
     by_ends = (np.abs(view.load.values[last] - view.load.values[first]) - noise - view.load.step) / length
-    return np.maximum(np.where(repeats > 2 * view.near, by_halves, by_ends), 0.0)
+    return np.asarray(np.maximum(np.where(repeats > 2 * view.near, by_halves, by_ends), 0.0))
 
 
 def _ends_in_a_jump(view: View, starts: Index, stops: Index) -> Mask:
