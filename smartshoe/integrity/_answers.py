@@ -33,9 +33,9 @@ def answered_s(time_s: Array, load: Array, reading: Array, width_s: float, thres
     correlations = _correlated(innovations[0] / norms[0], innovations[1] / norms[1])
     lags = np.arange(correlations.size) - correlations.size // 2
     best = int(np.argmax(correlations))
-    beside = np.abs(lags - lags[best]) <= given.few
+    is_near_best = np.abs(lags - lags[best]) <= given.few
     is_sure = correlations[best] * np.sqrt(innovations[0].size) > largest_of_noise(lags.size, given)
-    is_only = correlations[best] > given.clear * float(np.max(correlations[~beside]))
+    is_only = correlations[best] > given.clear * float(np.max(correlations[~is_near_best]))
     return float(lags[best]) * width_s if is_sure and is_only else None
 
 

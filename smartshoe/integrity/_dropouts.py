@@ -133,12 +133,12 @@ def dropped(view: View) -> Mask:
     return has_dropped
 
 
-def _stood_above(beside: Array, level: float) -> bool:
-    """Whether the readings ``beside`` a run stood above a ``level``.
+def _stood_above(neighbours: Array, level: float) -> bool:
+    """Whether the readings beside a run, ``neighbours`` (k,), stood above a ``level``.
 
     The second largest decides, since the largest may be a spike and others may have dropped out as well.
     """
-    return bool(np.sort(beside)[max(beside.size - 2, 0)] > level)
+    return bool(np.sort(neighbours)[max(neighbours.size - 2, 0)] > level)
 
 
 def _more_at_values(view: View, at: Mask, known: Array) -> Mask:
@@ -162,8 +162,8 @@ def _stands_clear_below(view: View, is_known: Mask) -> Mask:
     is_clear = np.zeros(y.size, dtype=bool)
     noise_reach = view.reading.largest * view.reading.noise
     for first, stop in zip(*runs_of(is_known), strict=True):
-        beside = np.concatenate([y[max(first - few, 0) : first], y[stop : stop + few]])
-        is_clear[first:stop] = beside.size > 0 and float(np.min(beside)) > y[first] + noise_reach[first]
+        neighbours = np.concatenate([y[max(first - few, 0) : first], y[stop : stop + few]])
+        is_clear[first:stop] = neighbours.size > 0 and float(np.min(neighbours)) > y[first] + noise_reach[first]
     return is_clear
 
 

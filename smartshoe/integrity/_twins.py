@@ -114,11 +114,11 @@ def _shared_segments(codes: Sequence[Codes], thresholds: Thresholds) -> Iterator
             max(shift, 0),
             min(one.size + shift, other.size),
         )  # where both overlap, in samples of the later one
-        mine = other[begin:stop]
-        for first, last in zip(*runs_of(one[begin - shift : stop - shift] == mine), strict=True):
+        overlap = other[begin:stop]
+        for first, last in zip(*runs_of(one[begin - shift : stop - shift] == overlap), strict=True):
             if not np.any((seeds >= begin + first) & (seeds < begin + last)):
                 continue
-            changes = np.count_nonzero(np.diff(mine[first:last]))
+            changes = np.count_nonzero(np.diff(overlap[first:last]))
             if changes > _fewest_changes(one, other, sum(each.size for each in codes), thresholds):
                 yield _SharedSegment(earlier, place, begin + int(first), begin + int(last))
 
@@ -182,7 +182,7 @@ def _windows_in_common(codes: Sequence[Codes], width: int) -> Iterator[tuple[int
 def _hashes(codes: Sequence[Codes], width: int) -> Codes:
     """Hashes of all windows of ``width`` samples within a recording, one recording after another: polynomials in BASE.
 
-    One cumulative sum serves all windows: each takes a difference of two sums, times the inverse power at its begin.
+    One cumulative sum serves all windows: each takes a difference of two sums, times the inverse power at its start.
     """
     whole = np.concatenate(codes)
     bases, inverse_bases = (np.full(whole.size, base % WORD, dtype=np.uint64) for base in (BASE, pow(BASE, -1, WORD)))

@@ -57,7 +57,7 @@ def _wild(channel: Channel, thresholds: Thresholds) -> Mask:
     """(n,) True at a few values of a ``channel`` that leap beyond nearly all others by ten times their span, and back.
 
     A run of them is ``few`` samples long at most, or longer where it is one number, which is no measurement. A run of
-    several values at the begin or the end of the recording leapt from nowhere: it may be a ramp that was caught in
+    several values at the beginning or the end of the recording leapt from nowhere: it may be a ramp that was caught in
     part.
     """
     is_wild = np.zeros(channel.values.size, dtype=bool)

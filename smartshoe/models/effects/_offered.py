@@ -159,8 +159,8 @@ def _conditions(count: int, step_s: float, *, logged: bool) -> Conditions:
     turns = np.linspace(0.0, max(2.0, count * step_s / 5.0), count)
     load = 1.0 - np.abs(turns % 2.0 - 1.0)
     load.flags.writeable = False  # an effect that writes to its input would spoil that of others
-    beside = (np.linspace(0.0, 3.0, count), 0.5 * load, RELAXING) if logged else (None, None, None)
-    temperature_k, neighbour, relaxing = beside
+    channels = (np.linspace(0.0, 3.0, count), 0.5 * load, RELAXING) if logged else (None, None, None)
+    temperature_k, neighbour, relaxing = channels
     time_s: Array = step_s * np.arange(count, dtype=float)
     return Conditions(time_s, load, step_s, temperature_k=temperature_k, neighbour=neighbour, relaxing=relaxing)
 

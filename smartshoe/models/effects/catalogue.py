@@ -59,10 +59,10 @@ def _offers() -> tuple[Mapping[str, _Offer], tuple[UsageError, ...]]:
     for entry in entry_points(group=GROUP):
         origin = _origin(entry, entry.name)  # it may have no other name yet
         try:
-            made = _offered(entry, origin)
-            if made.name in found or made.name in _own():
-                raise UsageError(f"{origin} has the name {made.name!r}, which is taken: give it another name")
-            found[made.name] = _Offer(made, _origin(entry, made.name))
+            offered = _offered(entry, origin)
+            if offered.name in found or offered.name in _own():
+                raise UsageError(f"{origin} has the name {offered.name!r}, which is taken: give it another name")
+            found[offered.name] = _Offer(offered, _origin(entry, offered.name))
         except UsageError as error:
             broken.append(error)
     return MappingProxyType(found), tuple(broken)

@@ -338,9 +338,9 @@ def _of_either_sign(effect: Effect, says: str, of_strength: str) -> Effect:
         one if one.null is None else replace(one, says=of_strength, lower=2.0 * one.null - one.upper)
         for one in effect.parameters
     )
-    made = copy(effect)
-    vars(made).update(says=says, parameters=tuple(strengths))
-    return made
+    variant = copy(effect)
+    vars(variant).update(says=says, parameters=tuple(strengths))
+    return variant
 
 
 class CoreEffect(Effect):

@@ -203,11 +203,11 @@ def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bo
     """
     length = residual.size // SEGMENTS
     parts = residual[: SEGMENTS * length].reshape(SEGMENTS, length)
-    beside = 4.0 / (length * sample_time_s)
-    power, *below = (_tone_powers(parts, frequency_hz - away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
+    apart_hz = 4.0 / (length * sample_time_s)
+    power, *below = (_tone_powers(parts, frequency_hz - away * apart_hz, sample_time_s) for away in (0.0, 1.0, 1.5))
     floor = 0.5 * float(sum(np.mean(one) for one in below))
     over = max(float(np.mean(power)) / max(floor, 1e-300) - 1.0, 0.0)
-    if frequency_hz > 0.5 / sample_time_s - beside:
+    if frequency_hz > 0.5 / sample_time_s - apart_hz:
         # Near half the sampling rate the power of a tone depends on its phase, which turns slowly.
         return bool(np.median(power) > 0.5 * STEADY * np.mean(power))
     return bool(np.median(power) > (STEADY + (STEADIER - STEADY) * over / (over + 3.0)) * np.mean(power))
@@ -227,9 +227,9 @@ def _stands_apart(residual: Array, load: Array, prediction: Array, frequency_hz:
     still = rates < STILL_PER_S
     if min(still.sum(), (~still).sum()) < LEAST_BLOCKS:
         return not _is_harmonic(prediction, frequency_hz, sample_time_s)
-    beside = 4.0 / (length * sample_time_s)
+    apart_hz = 4.0 / (length * sample_time_s)
     centred = parts - parts.mean(axis=1, keepdims=True)
-    whole, *above = (_tone_powers(centred, frequency_hz + away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
+    whole, *above = (_tone_powers(centred, frequency_hz + away * apart_hz, sample_time_s) for away in (0.0, 1.0, 1.5))
     floor = 0.5 * (above[0] + above[1])
     resting = float(whole[still].mean() - floor[still].mean())
     moving = float(whole[~still].mean() - floor[~still].mean())

@@ -73,8 +73,8 @@ class MullinsSoftening(Effect):
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """`inverse` beside the arm, whose load is taken off first."""
-        beside = replace(chain.arm, share=chain.arm.share * (1.0 - float(values[5])))
-        return BesideArm(_undone(*_amounts(values, beside.share), dead_zone=beyond_noise(chain.noise)), beside, step_s)
+        arm = replace(chain.arm, share=chain.arm.share * (1.0 - float(values[5])))
+        return BesideArm(_undone(*_amounts(values, arm.share), dead_zone=beyond_noise(chain.noise)), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """The static load from u: in closed form below the largest, by Newton above; exact without noise."""
