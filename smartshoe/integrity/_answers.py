@@ -1,9 +1,9 @@
-"""When a reading answers what its load does anew: how late what neither foretells of itself is in the other.
+"""How late a reading answers changes of its load, also where it lags by longer than the load stays on one level.
 
-A reading that lags by as long as its load stays on one level is never near its curve, and moves against the load as
-often as with it. But what it does next, beyond what it did before, is what the load did just then. So both are whitened
-(each is foretold by its own last few samples), and the innovations are correlated: of a reading and a load that have
-nothing to do with one another these are independent, whatever slow course each has (Haugh 1976).
+Such a reading is never near its curve, and moves against the load as often as with it. But what is new in it, beyond
+what its own past foretells, is due to what was new in the load. So each signal is predicted from its own last few
+samples, and the prediction errors (innovations) of both are correlated at all lags. If the two had nothing to do with
+each other the innovations would be independent, however slow either signal is (Haugh 1976).
 """
 
 from __future__ import annotations
@@ -15,50 +15,51 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 
 
 def answered_s(time_s: Array, load: Array, reading: Array, width_s: float, thresholds: Thresholds) -> float | None:
-    """How late a ``reading`` (n,) answers its ``load`` (n,), in bins of ``width_s``; None where that is not certain.
+    """How late in s a ``reading`` (n,) answers its ``load`` (n,), to a bin of ``width_s``; None where it is uncertain.
 
-    It answers where one correlation of innovations is beyond chance, and no other is half as large (`clear`) but the
-    ``few`` beside it: of a load that repeats itself there are others, and a step or two tell nothing.
+    It is certain where the largest correlation of innovations is beyond chance, and is larger by the factor `clear`
+    than all others but the ``few`` beside it. A load that repeats itself has others; a step or two have none beyond
+    chance.
     """
     given = thresholds
     bins = int((time_s[-1] - time_s[0]) / width_s)
     if bins < given.least_samples:
         return None
     grid = time_s[0] + (np.arange(bins) + 0.5) * width_s
-    new = [_innovations(binned(time_s, one, grid, width_s), given) for one in (load, reading)]
-    sizes = [float(np.linalg.norm(one)) for one in new]
-    if min(sizes) == 0.0:
+    innovations = [_innovations(binned(time_s, one, grid, width_s), given) for one in (load, reading)]
+    norms = [float(np.linalg.norm(one)) for one in innovations]
+    if min(norms) == 0.0:
         return None
-    together = _correlated(new[0] / sizes[0], new[1] / sizes[1])
-    late = np.arange(together.size) - together.size // 2
-    best = int(np.argmax(together))
-    beside = np.abs(late - late[best]) <= given.few
-    is_sure = together[best] * np.sqrt(new[0].size) > largest_of_noise(late.size, given)
-    is_only = together[best] > given.clear * float(np.max(together[~beside]))
-    return float(late[best]) * width_s if is_sure and is_only else None
+    correlations = _correlated(innovations[0] / norms[0], innovations[1] / norms[1])
+    lags = np.arange(correlations.size) - correlations.size // 2
+    best = int(np.argmax(correlations))
+    is_near_best = np.abs(lags - lags[best]) <= given.few
+    is_sure = correlations[best] * np.sqrt(innovations[0].size) > largest_of_noise(lags.size, given)
+    is_only = correlations[best] > given.clear * float(np.max(correlations[~is_near_best]))
+    return float(lags[best]) * width_s if is_sure and is_only else None
 
 
 def _innovations(values: Array, thresholds: Thresholds) -> Array:
-    """(n - few,) what the ``few`` values before each foretell of it in a straight line, taken off.
+    """(n - few,) errors of predicting each value from the ``few`` before it, by least squares.
 
-    The largest are cut short, which jumps are, and single steps: they would be all that is correlated.
+    The largest errors are clipped: jumps and single steps would else make up the whole correlation.
     """
     few, shifted = thresholds.few, values - values.mean()
-    before = np.stack([shifted[few - 1 - k : shifted.size - 1 - k] for k in range(few)], axis=1)
-    before = np.concatenate([before, np.ones((before.shape[0], 1))], axis=1)
-    new = shifted[few:] - before @ np.linalg.lstsq(before, shifted[few:], rcond=None)[0]
-    cut = cut_short(new, thresholds)
-    return np.asarray(cut - cut.mean())
+    past = np.stack([shifted[few - 1 - k : shifted.size - 1 - k] for k in range(few)], axis=1)
+    past = np.concatenate([past, np.ones((past.shape[0], 1))], axis=1)
+    errors = shifted[few:] - past @ np.linalg.lstsq(past, shifted[few:], rcond=None)[0]
+    clipped = cut_short(errors, thresholds)
+    return np.asarray(clipped - clipped.mean())
 
 
 def cut_short(values: Array, thresholds: Thresholds) -> Array:
-    """(n,) ``values``, of which the largest and the smallest, a ``faulty_share`` together, are no farther out."""
-    ends = 0.5 * thresholds.faulty_share * np.array([1.0, -1.0]) + np.array([0.0, 1.0])
-    return np.asarray(np.clip(values, *np.quantile(values, ends)))
+    """(n,) ``values`` (n,), clipped at the quantiles beyond which a ``faulty_share`` lies, half at either end."""
+    ranks = 0.5 * thresholds.faulty_share * np.array([1.0, -1.0]) + np.array([0.0, 1.0])
+    return np.asarray(np.clip(values, *np.quantile(values, ranks)))
 
 
 def _correlated(load: Array, reading: Array) -> Array:
-    """(2 m + 1,) sizes of the correlations at lags -m..m of the reading, m a quarter of the samples."""
+    """(2 m + 1,) sizes of the correlations at lags -m to m of the reading in samples, m a quarter of n."""
     from scipy.signal import correlate
 
     most = load.size // 4
@@ -67,7 +68,7 @@ def _correlated(load: Array, reading: Array) -> Array:
 
 
 def binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
-    """Means over bins, empty ones interpolated."""
+    """(b,) means of ``values`` (n,) over bins of ``width_s`` around ``grid`` (b,); empty bins are interpolated."""
     place = np.minimum(((time_s - time_s[0]) / width_s).astype(np.intp), grid.size - 1)
     count = np.bincount(place, minlength=grid.size)
     total = np.bincount(place, weights=values, minlength=grid.size)

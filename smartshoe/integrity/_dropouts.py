@@ -1,7 +1,8 @@
-"""Dropouts: the reading falls to the unloaded value, or to nothing, while the load stays.
+"""Dropouts: a sensor or its wire loses contact, and the channel falls to one level while the other channel stays.
 
-What is lost is the whole reading: it falls to one level, from whatever load. A reading that falls by one amount from
-whatever load (a level that switches), or that falls and drifts back (a draught over a sensor), has not dropped out.
+A dropout takes the whole reading: it falls abruptly to one level, from whatever load, stays there, and jumps back. A
+reading that falls by one amount from whatever load (a level that switches), or that falls and drifts back (a draught
+over a sensor), has not dropped out. A load may drop out in the same way, and is judged with the two signals swapped.
 """
 
 from __future__ import annotations
@@ -21,54 +22,60 @@ from smartshoe.signals.masks import runs_of
 
 
 def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``dropouts``; masked. To nothing or to rest, and to the upper end, where a wire that breaks reads as well.
+    """Kind ``dropouts``; masked: the reading falls to nothing or to rest, or leaps to its upper end.
 
-    A value that another recording of the unit dropped to (``view.ends``) needs no fall from a large load here.
+    At the upper end reads a sensor whose wire is broken. There dropouts must take one value, since a pressure may leap
+    and come back. A value to which another recording of the unit dropped (``view.ends``) needs no fall from a large
+    load here.
     """
     if view.span == 0.0:
         return
     known = view.sign * view.ends.dropouts
     is_upper = known > float(view.curve[1].max())
     at = dropped(view)
-    if at.any() and not _one_level(view, at):
+    if at.any() and not _falls_to_one_level(view, at):
         at[:] = False
-    at, values = _with_others(view, at, known[~is_upper])
+    at, values = _with_more_at_values(view, at, known[~is_upper])
     if at.any():
         yield _finding(view, at, values)
-    over = view.upside_down()
-    up = dropped(over)
-    # A pressure may jump and come back; a rail is one value.
-    if up.any() and not (_one_value(over.reading.values[up], view.thresholds) and _one_level(over, up)):
-        up[:] = False
-    up, values = _with_others(over, up, -known[is_upper])
-    if (up & ~at).any():
-        yield _finding(over, up & ~at, values)
+    flipped = view.upside_down()
+    at_upper = dropped(flipped)
+    if at_upper.any() and not (
+        _one_value(flipped.reading.values[at_upper], view.thresholds) and _falls_to_one_level(flipped, at_upper)
+    ):
+        at_upper[:] = False
+    at_upper, values = _with_more_at_values(flipped, at_upper, -known[is_upper])
+    if (at_upper & ~at).any():
+        yield _finding(flipped, at_upper & ~at, values)
 
 
 def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``dropouts``; masked: the load falls to nothing and comes back while the reading stands.
 
-    A reading that lags may still rise by then, so that it is asked whether it falls from where it is highest. Nor has a
-    load dropped out that falls there as a matter of course, as one that is switched on and off.
+    A reading that lags may still rise when the load falls, so its fall is taken from its highest value so far. A load
+    that often falls to that level, as one that is switched on and off, has not dropped out.
     """
     if view.span == 0.0 or view.load_span == 0.0:
         return
     swapped = view.swapped()
-    at, y = dropped(swapped), view.reading.values
-    still = 2.0 * view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
+    at, reading = dropped(swapped), view.reading.values
+    standing_limit = 2.0 * view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
     for first, stop in zip(*runs_of(at), strict=True):
-        comes_back = stop < y.size and bool(swapped.jump[stop - 1] > 0.0)
-        there = y[first - 1 : stop + 1]
-        at[first:stop] = comes_back and float(np.max(np.maximum.accumulate(there) - there)) < still
-    if not at.any() or not _one_level(swapped, at) or _as_a_matter_of_course(swapped, at):
+        comes_back = stop < reading.size and bool(swapped.jump[stop - 1] > 0.0)
+        readings = reading[first - 1 : stop + 1]
+        at[first:stop] = comes_back and float(np.max(np.maximum.accumulate(readings) - readings)) < standing_limit
+    if not at.any() or not _falls_to_one_level(swapped, at) or _often_falls_there(swapped, at):
         return
     yield replace(_finding(swapped, at, np.zeros(0)), no_load=view.whole(at))
 
 
-def _with_others(view: View, at: Mask, known: Array) -> tuple[Mask, Array]:
-    """Samples ``at`` which the reading is gone, with others at their values or at ``known`` ones, and these values."""
+def _with_more_at_values(view: View, at: Mask, known: Array) -> tuple[Mask, Array]:
+    """Samples ``at`` (m,) of dropouts, with more samples at their values or at ``known`` ones; and these values.
+
+    More samples are looked for until none is found: with those found cut out, the noise is known better.
+    """
     known = np.union1d(known, common_values(view.reading.values[at], view.thresholds))
-    while (more := _also_gone(view, at, known) & ~at).any():  # with those known cut out the noise is known better
+    while (more := _more_at_values(view, at, known) & ~at).any():
         at = at | more
     return at, known
 
@@ -91,110 +98,125 @@ def _finding(view: View, at: Mask, known: Array) -> Finding:
 
 
 def _one_value(values: Array, thresholds: Thresholds) -> bool:
-    """Whether nearly all of ``values`` are one."""
+    """Whether nearly all of ``values`` (k,) are equal."""
     count = np.unique(values, return_counts=True)[1]
     return bool(count.max() > (1.0 - thresholds.same) * values.size)
 
 
 def dropped(view: View) -> Mask:
-    """(m,) samples of runs that are low although the load is on, or below rest, and begin and end abruptly."""
+    """(m,) samples of runs that are low although the load is on, or below rest, and that begin and end abruptly.
+
+    Both edges of a run must make up at least half (`clear`) of what is lost between the expected reading and the run's.
+    A run whose end is not seen, or at whose end the load is off, counts where it fell from a load that is not small: a
+    contact that lets go at a low load jumps as well.
+    """
     y, given = view.reading.values, view.thresholds
     above = view.expected - view.rest
-    least = np.maximum(given.standing * view.span, view.reading.largest * view.reading.noise)
-    loaded = above > given.clear * least
-    low = loaded & (y < view.rest + given.same * above)
-    below = y < view.rest - given.clear * least
-    out = np.zeros(y.size, dtype=bool)
+    margin = np.maximum(given.standing * view.span, view.reading.largest * view.reading.noise)
+    is_loaded = above > given.clear * margin
+    is_low = is_loaded & (y < view.rest + given.same * above)
+    is_below_rest = y < view.rest - given.clear * margin
+    has_dropped = np.zeros(y.size, dtype=bool)
     jump, gap = given.clear * view.jump, view.gap
-    lost = np.where(below, view.rest - y, view.expected - y)
-    for first, stop in zip(*runs_of(low | below), strict=True):
+    lost = np.where(is_below_rest, view.rest - y, view.expected - y)
+    for first, stop in zip(*runs_of(is_low | is_below_rest), strict=True):
         ends_open = stop == y.size or bool(gap[stop - 1])
-        # Both edges make up most of what is lost. A spike just before or after is no edge.
+        # A spike just before or after the run is no edge: readings must have stood above it.
         falls = first > 0 and jump[first - 1] < -lost[first]
-        falls = falls and _stood(y[max(first - given.few, 0) : first], y[first] + lost[first] / given.clear)
+        falls = falls and _stood_above(y[max(first - given.few, 0) : first], y[first] + lost[first] / given.clear)
         rises = not ends_open and jump[stop - 1] > lost[stop - 1]
-        rises = rises and _stood(y[stop : stop + given.few], y[stop - 1] + lost[stop - 1] / given.clear)
+        rises = rises and _stood_above(y[stop : stop + given.few], y[stop - 1] + lost[stop - 1] / given.clear)
         if falls and rises:
-            out[first:stop] = True
-        elif falls and (ends_open or not loaded[stop]):
-            # The load went while the reading was gone. A contact that lets go at a low load jumps too.
-            out[first:stop] = above[first] > given.same * view.span or below[first]
-    return out
+            has_dropped[first:stop] = True
+        elif falls and (ends_open or not is_loaded[stop]):
+            has_dropped[first:stop] = above[first] > given.same * view.span or is_below_rest[first]
+    return has_dropped
 
 
-def _stood(beside: Array, level: float) -> bool:
-    """Whether readings stood above a level: the second largest did, since one may be a spike and others be gone."""
-    return bool(np.sort(beside)[max(beside.size - 2, 0)] > level)
+def _stood_above(neighbours: Array, level: float) -> bool:
+    """Whether the readings beside a run, ``neighbours`` (k,), stood above a ``level``.
+
+    The second largest decides, since the largest may be a spike and others may have dropped out as well.
+    """
+    return bool(np.sort(neighbours)[max(neighbours.size - 2, 0)] > level)
 
 
-def _also_gone(view: View, at: Mask, known: Array) -> Mask:
-    """(m,) samples at the level of known dropouts where load is too low to tell: isolated ones and held runs."""
+def _more_at_values(view: View, at: Mask, known: Array) -> Mask:
+    """(m,) more samples at the level or the ``known`` values of dropouts, where the load is too low to tell by itself.
+
+    These are isolated samples near that level, and at exactly a known value held runs and runs clear of the noise.
+    """
     y = view.reading.values
-    exact = np.isin(y, known)
-    near = exact | _near(view, float(np.median(y[at]))) if at.any() else exact
-    if not near.any():
-        return near
+    is_known = np.isin(y, known)
+    is_near = is_known | _is_near(view, float(np.median(y[at]))) if at.any() else is_known
+    if not is_near.any():
+        return is_near
     repeated = held(view, at)
     repeated[:-1] |= repeated[1:] & (y[1:] == y[:-1])
-    return (near & isolated_beside(view, at)) | (exact & repeated) | _fallen(view, exact)
+    return (is_near & isolated_beside(view, at)) | (is_known & repeated) | _stands_clear_below(view, is_known)
 
 
-def _fallen(view: View, exact: Mask) -> Mask:
-    """(m,) runs of ``exact`` values that stand clear of the noise of what is beside them."""
+def _stands_clear_below(view: View, is_known: Mask) -> Mask:
+    """(m,) runs of samples at known values, ``is_known`` (m,), that stand below all beside them, clear of noise."""
     y, few = view.reading.values, view.thresholds.few
-    out = np.zeros(y.size, dtype=bool)
-    clear = view.reading.largest * view.reading.noise
-    for first, stop in zip(*runs_of(exact), strict=True):
-        beside = np.concatenate([y[max(first - few, 0) : first], y[stop : stop + few]])
-        out[first:stop] = beside.size > 0 and float(np.min(beside)) > y[first] + clear[first]
-    return out
+    is_clear = np.zeros(y.size, dtype=bool)
+    noise_reach = view.reading.largest * view.reading.noise
+    for first, stop in zip(*runs_of(is_known), strict=True):
+        neighbours = np.concatenate([y[max(first - few, 0) : first], y[stop : stop + few]])
+        is_clear[first:stop] = neighbours.size > 0 and float(np.min(neighbours)) > y[first] + noise_reach[first]
+    return is_clear
 
 
 def common_values(y: Array, thresholds: Thresholds) -> Array:
-    """The values that dropouts take exactly, where they do: a rail, a zero, an error code."""
+    """Those values among ``y`` (k,) that many dropouts take exactly: a rail, a zero, an error code; or none."""
     values, count = np.unique(y, return_counts=True)
     return values[count > max(thresholds.faulty_share * y.size, 2)]
 
 
-def _near(view: View, level: float) -> Mask:
+def _is_near(view: View, level: float) -> Mask:
+    """(m,) readings within the noise and what counts as standing still of a ``level``."""
     within = view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
     return np.abs(view.reading.values - level) <= within
 
 
-def _as_a_matter_of_course(view: View, at: Mask) -> bool:
-    """Whether of all sudden falls to the level of those ``at`` no more than half (`clear`) are among these."""
-    starts, _ = runs_of(_near(view, float(np.median(view.reading.values[at]))))
+def _often_falls_there(view: View, at: Mask) -> bool:
+    """Whether the runs ``at`` (m,) are at most half (`clear`) of all sudden falls to their level."""
+    starts, _ = runs_of(_is_near(view, float(np.median(view.reading.values[at]))))
     falls = starts[starts > 0]
     falls = falls[view.jump[falls - 1] < 0.0]
     return bool(view.thresholds.clear * at[falls].sum() <= falls.size)
 
 
-def _one_level(view: View, at: Mask) -> bool:
-    """Whether falls end at one level, whatever the load was: the levels scatter less than what was lost.
+def _falls_to_one_level(view: View, at: Mask) -> bool:
+    """Whether the runs ``at`` (m,) are falls to one level, whatever the load was.
 
-    One fall, or several from much the same load, must have taken most of a large reading. Short falls must be several
-    and from different loads: a spike may fall anywhere.
+    1. Most samples lie near the runs' median level, and most runs stay there. Edges may be caught halfway.
+    2. The largest loss is a share (`same`) of the span at least.
+    3. Of three runs and more the levels scatter less than the losses do, or no more than noise.
+    4. Runs of one or two samples must be three at least and from different loads, since a spike may fall anywhere.
     """
     y, given = view.reading.values, view.thresholds
-    most = 1.0 - given.same  # edges may be caught halfway
+    most = 1.0 - given.same
     starts, stops = runs_of(at)
-    if _near(view, float(np.median(y[at])))[at].mean() < most:
+    if _is_near(view, float(np.median(y[at])))[at].mean() < most:
         return False
-    still = [_stands(y[a:b], view) for a, b in zip(starts, stops, strict=True)]
-    if float(np.average(still, weights=stops - starts)) < most:
+    stays = [_stays_there(y[a:b], view) for a, b in zip(starts, stops, strict=True)]
+    if float(np.average(stays, weights=stops - starts)) < most:
         return False
     before = y[np.maximum(starts - 1, 0)]
-    after = np.array([float(np.median(y[a:b])) for a, b in zip(starts, stops, strict=True)])
-    lost = np.maximum(before, view.expected[starts]) - after
+    levels = np.array([float(np.median(y[a:b])) for a, b in zip(starts, stops, strict=True)])
+    lost = np.maximum(before, view.expected[starts]) - levels
     noise = view.reading.quiet_noise + view.reading.step
-    if lost.max() < given.same * view.span or (starts.size > 2 and _scatter(after) > max(_scatter(lost), noise)):
+    if lost.max() < given.same * view.span or (
+        starts.size > 2 and _median_deviation(levels) > max(_median_deviation(lost), noise)
+    ):
         return False
     short = int((stops - starts).max()) <= 2
     return not short or (starts.size > 2 and float(np.ptp(view.expected[at])) > given.same * view.span)
 
 
-def _stands(part: Array, view: View) -> bool:
-    """Whether the reading stays where it fell to: it has lost its sensor, and is not on its way back."""
+def _stays_there(part: Array, view: View) -> bool:
+    """Whether the readings ``part`` (k,) of a dropout stay where they fell to, and are not on their way back."""
     third = part.size // 3
     if third < 2:
         return True
@@ -203,5 +225,6 @@ def _stands(part: Array, view: View) -> bool:
     return bool(moved <= noise + view.thresholds.standing * view.span)
 
 
-def _scatter(values: Array) -> float:
+def _median_deviation(values: Array) -> float:
+    """The median distance from the median."""
     return float(np.median(np.abs(values - np.median(values))))

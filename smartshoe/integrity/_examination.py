@@ -1,4 +1,11 @@
-"""`examine`: every detector over every recording, in an order in which none takes another's fault for its own."""
+"""`examine`: all detectors over all recordings, in an order in which none takes another's fault for its own.
+
+1. Each recording is cleaned: samples that are no measurements of their own (blanks, held or interpolated rows) are left
+   out, counters that ran over are counted on, and wild values are taken out (`_cleaned`).
+2. The detectors look at each recording, first at its time base, then at load and reading together (`_examined`).
+3. What one recording shows of the sensor's ends and of the clocks is used for the others (`_examined_together`).
+4. The load is mended where it is not known, and the clocks of all recordings are compared (`examine`).
+"""
 
 from __future__ import annotations
 
@@ -54,21 +61,22 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class _Tamed:
-    """A recording as ``logged``, but each channel at its own rate, and counted on; ``recording``: without wild values.
+class _Cleaned:
+    """A recording that detectors may look at.
 
-    ``findings``: what was found on the way. ``is_rest``: samples that are no measurements of their own were left out.
+    ``logged``: each channel at its own rate, counters counted on. ``recording``: the same without wild values.
+    ``findings``: the faults found so far. ``is_thinned``: samples that are no measurements of their own were left out.
     """
 
     logged: Recording
     recording: Recording
     findings: tuple[Finding, ...]
-    is_rest: bool
+    is_thinned: bool
 
 
 @dataclass(frozen=True, eq=False)
 class _Examined:
-    """What was found in one recording, its ``usable`` samples (n,), and what it tells of its clocks ``alone``."""
+    """What was found in one recording, its ``usable`` samples (n,), and what it shows of its clocks ``alone``."""
 
     findings: list[Finding]
     usable: Mask
@@ -76,69 +84,70 @@ class _Examined:
 
     @property
     def is_against(self) -> bool:
-        """Whether its reading goes against the load, or not with it."""
+        """Whether its reading moves against the load, or does not move with it."""
         return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in self.findings)
 
 
 def examine(
     recordings: Sequence[Recording], thresholds: Thresholds | None = None, count: int | None = None
 ) -> Integrity:
-    """What is wrong with the data of ``recordings``, before any model; deterministic.
+    """What is wrong with the data of ``recordings``, before any model is fitted; deterministic.
 
-    The first ``count`` are fitted, or all; what the others show of the clocks changes nothing of these.
-    Each recording has one reference load and one reading; where it has not, that is its refusal, whatever the others
-    are. Raises `InputError` where there is no recording at all, `UsageError` for ``thresholds`` that are none.
+    The first ``count`` recordings are fitted, or all; the others are only judged on, and what they show of the clocks
+    changes nothing of the fitted ones. Each recording must have one reference load and one reading; one that has not is
+    refused, whatever the others are. Raises `InputError` where there is no recording at all, `UsageError` for
+    ``thresholds`` that are none.
     """
     if not recordings:
         raise InputError("there is no recording to examine: give at least one file")
     decided = decided_by(thresholds)
-    tamed = _tamed(recordings, decided)
-    count = len(tamed) if count is None else count
-    examined = _examined_together(tamed, decided, count)
-    refused = [_refusal(tame.recording, one, decided) for tame, one in zip(tamed, examined, strict=True)]
-    usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
-    put_right = [_put_right(*one, decided) for one in zip(tamed, examined, usable, strict=True)]
-    clocks = clocks_of([one for one, _ in put_right], usable, [one.alone for one in examined], count, decided)
+    cleaned = _cleaned(recordings, decided)
+    count = len(cleaned) if count is None else count
+    examined = _examined_together(cleaned, decided, count)
+    refused = [_refusal(clean.recording, one, decided) for clean, one in zip(cleaned, examined, strict=True)]
+    usable = [one.usable & (refusal is None) for one, refusal in zip(examined, refused, strict=True)]
+    mended = [_mended(*one, decided) for one in zip(cleaned, examined, usable, strict=True)]
+    clocks = clocks_of([one for one, _ in mended], usable, [one.alone for one in examined], count, decided)
     for place, clock in clocks.own.items():
-        recording, findings = put_right[place]
+        recording, findings = mended[place]
         findings[:] = [one for one in findings if one.kind != "two_clocks"]
         findings.append(from_two_clocks(recording, clock, "than in the other recordings"))
     return Integrity(
-        tuple(recording for recording, _ in put_right),
+        tuple(recording for recording, _ in mended),
         tuple(
             _fault(number, recording, finding)
-            for number, (recording, findings) in enumerate(put_right)
+            for number, (recording, findings) in enumerate(mended)
             for finding in findings
         ),
         tuple(usable),
         clocks.offsets_s,
         clocks.rates,
         clocks.shared,
-        tuple(why for why in refused if why is not None),
+        tuple(refusal for refusal in refused if refusal is not None),
         clocks.others,
     )
 
 
-def _examined_together(tamed: Sequence[_Tamed], thresholds: Thresholds, count: int) -> list[_Examined]:
-    """What was found in each recording, by all that the others tell of the sensor's ends and of the clocks.
+def _examined_together(cleaned: Sequence[_Cleaned], thresholds: Thresholds, count: int) -> list[_Examined]:
+    """What was found in each recording, with what the others show of the sensor's ends and of the clocks.
 
-    Of the clocks only the first ``count`` tell, which are fitted.
+    Only the first ``count``, which are fitted, tell of the clocks.
     """
-    examined = [_examined(one, thresholds) for one in tamed]
-    ends = _ends_told_by([finding for one in examined for finding in one.findings])
-    if ends.dropouts.size + ends.rails.size and len(tamed) > 1:
-        examined = [_examined(one, thresholds, ends) for one in tamed]
+    examined = [_examined(one, thresholds) for one in cleaned]
+    ends = _ends_seen_in([finding for one in examined for finding in one.findings])
+    if ends.dropouts.size + ends.rails.size and len(cleaned) > 1:
+        examined = [_examined(one, thresholds, ends) for one in cleaned]
     with_load = [one.alone.lags for one in examined[:count] if not one.is_against]
-    if not any(one.is_against for one in examined) or (theirs := one_clock(with_load, thresholds)) is None:
+    if not any(one.is_against for one in examined) or (clock := one_clock(with_load, thresholds)) is None:
         return examined
     return [
-        _as_others_follow(tame, one, theirs, thresholds, ends) if one.is_against else one
-        for tame, one in zip(tamed, examined, strict=True)
+        _turned_where_as_others(clean, one, clock, thresholds, ends) if one.is_against else one
+        for clean, one in zip(cleaned, examined, strict=True)
     ]
 
 
 def _refusal(recording: Recording, found: _Examined, thresholds: Thresholds) -> str | None:
-    """Why a recording is of no use, or None: a fatal fault, or hardly any sample that is not at fault."""
+    """Why a recording is of no use, or None: it has a fatal fault, or hardly any sample without one."""
     says = next((one.says for one in found.findings if one.severity == "fatal"), None)
     masking = [one for one in found.findings if one.masks]
     faulty = float(np.any([one.at for one in masking], axis=0).mean()) if masking else 0.0
@@ -148,53 +157,60 @@ def _refusal(recording: Recording, found: _Examined, thresholds: Thresholds) -> 
     return None if says is None else f"{recording.label}: {says}"
 
 
-def _ends_told_by(findings: Sequence[Finding]) -> Ends:
+def _ends_seen_in(findings: Sequence[Finding]) -> Ends:
+    """The ends of the unit's sensor that ``findings`` of any recording show."""
     rails = [one.rail for one in findings if one.rail is not None]
     return Ends(np.unique(np.concatenate([np.zeros(0), *(one.values for one in findings)])), np.unique(rails))
 
 
-def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
-    made = []
+def _cleaned(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Cleaned]:
+    """Each recording as `_Cleaned`; held channels are looked for in all of them together."""
+    cleaned = []
     filled = [without_blanks(one, thresholds) for one in recordings]
-    for (_, blank), (read, held) in zip(filled, without_held([one for one, _ in filled], thresholds), strict=True):
-        measured, between = without_interpolated(read, thresholds)
+    for (_, blank), (at_own_rate, held) in zip(
+        filled, without_held([one for one, _ in filled], thresholds), strict=True
+    ):
+        measured, interpolated = without_interpolated(at_own_rate, thresholds)
         logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
-        own = (*blank, *held, *between)  # samples that are no measurements of their own
-        made.append(_Tamed(logged, recording, (*own, *wrapped, *wild), bool(own)))
-    return made
+        thinned = (*blank, *held, *interpolated)  # samples that are no measurements of their own
+        cleaned.append(_Cleaned(logged, recording, (*thinned, *wrapped, *wild), bool(thinned)))
+    return cleaned
 
 
-def _put_right(tame: _Tamed, found: _Examined, usable: Mask, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
-    """A recording with its load as far as it is known, and all findings in it."""
-    recording = _with_known_load(tame.recording, found.findings)
-    between, stepped = between_steps(recording, thresholds) if usable.any() else (recording, [])
-    return between, [*found.findings, *stepped]
+def _mended(clean: _Cleaned, found: _Examined, usable: Mask, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
+    """A recording with its load mended as far as it is known, and all findings in it."""
+    recording = _with_known_load(clean.recording, found.findings)
+    mended, stepped = between_steps(recording, thresholds) if usable.any() else (recording, [])
+    return mended, [*found.findings, *stepped]
 
 
 def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recording:
-    """Without the samples of the load at which it was not the load."""
-    none = [finding.no_load for finding in findings if finding.no_load is not None and finding.no_load.any()]
-    return with_missing(recording, recording.load, np.any(none, axis=0)) if none else recording
+    """``recording`` without the samples of the load at which findings say that it was not the load."""
+    not_load = [finding.no_load for finding in findings if finding.no_load is not None and finding.no_load.any()]
+    return with_missing(recording, recording.load, np.any(not_load, axis=0)) if not_load else recording
 
 
-def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *, turned: bool = False) -> _Examined:
-    """What was found in one recording; ``turned``: its reading rises where it seems to fall."""
-    recording = tame.logged
+def _examined(clean: _Cleaned, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *, turned: bool = False) -> _Examined:
+    """What was found in one recording; ``turned``: with its reading turned over, as a lag may make it seem to fall.
+
+    A fault that makes a recording useless ends the search, since later detectors would be misled by it.
+    """
+    recording = clean.logged
     usable = np.ones(len(recording), dtype=bool)
-    short = list(short_recording(recording, thresholds, tame.is_rest))
+    short = list(short_recording(recording, thresholds, clean.is_thinned))
     if short:
-        return _Examined([*tame.findings, *short], ~usable)
-    findings = [*tame.findings, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
+        return _Examined([*clean.findings, *short], ~usable)
+    findings = [*clean.findings, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
-    whole = np.ones(len(recording), dtype=bool)
-    if (lacking := _lacking(recording)) is not None:
-        return _Examined([*findings, Finding.fatal("no_reference", whole, lacking)], usable)
-    if (too_large := _beyond_squares(recording)) is not None:
-        return _Examined([*findings, Finding.fatal("does_not_follow_load", whole, too_large)], usable)
-    view = _view(tame.recording, thresholds, ends)
+    all_samples = np.ones(len(recording), dtype=bool)
+    if (lack := _lack_of_channels(recording)) is not None:
+        return _Examined([*findings, Finding.fatal("no_reference", all_samples, lack)], usable)
+    if (too_large := _too_large(recording)) is not None:
+        return _Examined([*findings, Finding.fatal("does_not_follow_load", all_samples, too_large)], usable)
+    view = _view(clean.recording, thresholds, ends)
     if view is None:
         says = "load and reading are hardly ever there at the same time: record them together"
         return _Examined([*findings, Finding.fatal("missing_samples", ~usable, says)], usable)
@@ -212,19 +228,22 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
     return _Examined(findings, usable, Alone(view.offset_s, view.rate, seen))
 
 
-def _as_others_follow(tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, ends: Ends) -> _Examined:
-    """A recording whose reading goes against the load, turned over if it then lags as the others do by their clocks.
+def _turned_where_as_others(
+    clean: _Cleaned, as_is: _Examined, clock: OneClock, thresholds: Thresholds, ends: Ends
+) -> _Examined:
+    """A recording whose reading goes against the load, turned over where it then lags by the others' ``clock``.
 
-    A reading that is late by half a period of its load seems to fall as the load rises.
+    A reading that is late by half a period of its load seems to fall as the load rises. Turned over, it must lie on
+    that clock, and nearer to it than as it was.
     """
-    over = _examined(tame, thresholds, ends, turned=True)
-    turned, as_it_was = over.alone.lags, mine.alone.lags
-    is_theirs = turned.are_of(theirs, thresholds) and turned.off_from_s(theirs) < as_it_was.off_from_s(theirs)
-    return over if is_theirs and not over.is_against else mine
+    turned_over = _examined(clean, thresholds, ends, turned=True)
+    turned_lags, lags = turned_over.alone.lags, as_is.alone.lags
+    is_by_clock = turned_lags.are_of(clock, thresholds) and turned_lags.off_from_s(clock) < lags.off_from_s(clock)
+    return turned_over if is_by_clock and not turned_over.is_against else as_is
 
 
-def _lacking(recording: Recording) -> str | None:
-    """Why there is no pair of load and reading, or None."""
+def _lack_of_channels(recording: Recording) -> str | None:
+    """Why a recording does not have one load and one reading, with what would mend it; or None."""
     others = first_names([one.name for one in recording.of_role("auxiliary")])
     among = f" (columns: {others})" if others else ""
     if not recording.of_role("load"):
@@ -242,18 +261,24 @@ def _lacking(recording: Recording) -> str | None:
     return None if readings else f"there is no reading: name its column with --sensor{among}"
 
 
-def _beyond_squares(recording: Recording) -> str | None:
-    """Why nothing can be computed of numbers so large that squares of their sums of squares are none, or None."""
-    most = (np.finfo(float).max / len(recording) ** 2) ** 0.25
+def _too_large(recording: Recording) -> str | None:
+    """Why nothing can be computed of a recording's numbers, or None.
+
+    They are so large that the square of a sum of their squares overflows.
+    """
+    limit = (np.finfo(float).max / len(recording) ** 2) ** 0.25
     for channel in (recording.load, recording.sensor):
         largest = float(np.max(np.abs(channel.values), initial=0.0))
-        if not largest * max(channel.unit.scale, 1.0) < most:
+        if not largest * max(channel.unit.scale, 1.0) < limit:
             return f"{channel.name} holds numbers up to {largest:.2g}, which are no measurements: give another unit"
     return None
 
 
 def _view(recording: Recording, thresholds: Thresholds, ends: Ends) -> View | None:
-    """The recording where load and reading are both present, the reading rising with load; None where hardly ever."""
+    """The recording where load and reading are both present, its reading turned to rise with load.
+
+    None where both are present at too few samples.
+    """
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
     if index.size < thresholds.least_samples:
@@ -267,6 +292,7 @@ def _view(recording: Recording, thresholds: Thresholds, ends: Ends) -> View | No
 
 
 def _fault(number: int, recording: Recording, finding: Finding) -> DataFault:
+    """The ``finding`` in recording ``number`` as the result lists it."""
     at = np.flatnonzero(finding.at)
     first, last = (int(at[0]), int(at[-1])) if at.size else (0, len(recording) - 1)
     return DataFault(

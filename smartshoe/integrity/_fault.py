@@ -1,4 +1,4 @@
-"""`DataFault` and `Integrity`: what is wrong with the data itself, before any model is asked."""
+"""`DataFault` and `Integrity`, the results of `examine`: what is wrong with the data before any model is fitted."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Severity = Literal["minor", "material", "fatal"]
 class DataFault:
     """One fault of one recording.
 
-    ``kind`` is an identifier of the catalogue of effects where it has one (``held_samples``, ``spikes``, ``hum``),
-    else a word of its own (``gaps``, ``two_clocks``). ``recording`` is the index of the recording, ``label`` what it
-    is called, ``start_s`` to ``stop_s`` the time from the first sample at fault to the last, ``share`` the fraction
-    of samples at fault. ``severity``: *minor* asks for nothing, *material* would show in a fit that ignores it,
-    *fatal* leaves this recording without use. ``error`` is the rms that a fault of all samples, which masks none, adds
-    to the reading, in the reading's unit.
+    ``kind`` is an identifier of the catalogue of effects where it has one (``held_samples``, ``spikes``, ``hum``), else
+    a word of its own (``gaps``, ``two_clocks``). ``recording`` is the index of the recording, ``label`` its name.
+    ``start_s`` to ``stop_s`` is the time from the first sample at fault to the last, ``share`` the fraction of samples
+    at fault. ``severity``: *minor* asks for nothing, *material* would show in a fit that ignores it, *fatal* makes the
+    recording useless. ``error`` is the rms, in the reading's unit, that a fault which masks no sample adds to the
+    reading.
     """
 
     kind: str
@@ -44,13 +44,12 @@ class DataFault:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What a detector hands back: ``at`` (n,) marks the samples at fault, over all samples of the recording.
+    """What a detector returns: a fault of ``kind`` at the samples ``at`` (n,) of the recording.
 
-    Where ``masks`` is set no fit may use those samples.
-    ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded; ``error`` that of
-    `DataFault`. ``no_load`` (n,) marks samples of the load that are none. ``cut_off`` (n,) marks others than ``at``
-    that no fit may use either, and that are as they must be: at rest beyond the end of the sensor. ``rail`` is the
-    value, as recorded, at which the sensor ends.
+    ``masks``: no fit may use those samples. ``cut_off`` (n,): other samples that no fit may use, though they are no
+    fault: at rest beyond the end of the sensor. ``no_load`` (n,): samples of the load that are not the load. ``values``
+    (v,): the values, as recorded, that the reading takes exactly by this fault; ``rail``: the value at which the sensor
+    ends. ``error``: as in `DataFault`.
     """
 
     kind: str
@@ -66,34 +65,37 @@ class Finding:
 
     @classmethod
     def fatal(cls, kind: str, at: Mask, says: str) -> Finding:
-        """One for which no sample of the recording can be used; it is refused by what ``says``."""
+        """A fault that makes all samples of the recording useless; it is refused with the sentence ``says``."""
         return cls(kind, at, says, "fatal", masks=True)
 
 
 @dataclass(frozen=True)
 class OneClock:
-    """One pair of clocks for all recordings: the lag ``before_s`` at the beginning of each, its growth in s per s."""
+    """Lag of the readings behind their loads: ``before_s`` at a recording's beginning, growing by ``rate`` in s per s.
+
+    It is of one pair of clocks, that of the load and that of the reading.
+    """
 
     before_s: float
     rate: float
 
     def lag_s(self, at_s: Array) -> Array:
-        """(w,) lags at moments ``at_s`` (w,) from the beginning of a recording."""
+        """(w,) lags in s at times ``at_s`` (w,) from the beginning of a recording."""
         return self.before_s + self.rate * at_s
 
 
 @dataclass(frozen=True, eq=False)
 class Integrity:
-    """What `examine` found: one entry a recording in ``recordings``, ``usable``, ``clock_offset_s``, ``clock_rate``.
+    """What `examine` found: one entry a recording in ``recordings``, ``usable``, ``clock_offset_s`` and ``clock_rate``.
 
-    ``recordings`` are those that were given, but for samples of load or reading that tell nothing: these are missing,
-    or are left out of a channel that is held between its samples.
-    ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
-    held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
-    recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``one_clock`` is what all of
-    them share that are fitted, where one pair of clocks accounts for how late their readings follow; ``others`` are
-    the places of recordings that only judge, and go by other clocks. ``refusals`` says in a sentence each, in their
-    order, why the recordings without a usable sample are of no use.
+    ``recordings`` are those that were given, without samples of load or reading that tell nothing: these are missing,
+    or whole rows are left out where a channel was held, blank or interpolated. ``usable`` holds (n,) masks of samples
+    that a fit may use: load and reading are present, and the sample is no spike, dropout or held value nor at a rail.
+    ``clock_offset_s`` is how much later the reading is than the load in the middle of the recording, 0 where the clocks
+    agree; ``clock_rate`` is how that lag grows in s per s. ``one_clock`` is the lag that all fitted recordings share,
+    where one pair of clocks explains it. ``others`` are the places of recordings that are only judged on and go by
+    other clocks. ``refusals`` says why each recording without a usable sample is useless, in a sentence each, in their
+    order.
     """
 
     recordings: tuple[Recording, ...]

@@ -1,4 +1,9 @@
-"""Whether the reading follows the load at all, and in the right direction."""
+"""Whether the reading follows the load at all, and in the right direction.
+
+A reading follows where two things hold. The load explains enough of its variance, through a curve and first-order lags.
+And the increments of both go together, over at least one time constant that a law may have: a random walk may be
+explained by chance, but does not move along. A slow unit may answer changes of the load late instead (`_answers_soon`).
+"""
 
 from __future__ import annotations
 
@@ -19,80 +24,86 @@ RISES_WITH_LOAD = ("pressure", "force")
 
 
 def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``does_not_follow_load``: fatal; the reading is constant, noise, or another channel's."""
-    whole = np.ones(len(view.recording), dtype=bool)
+    """Kind ``does_not_follow_load``, fatal: the reading is constant, noise or another channel's, or froze (`frozen`).
+
+    The sentence names the likeliest cause: a reading that does not move along, one that goes on while the load stands,
+    or a load that is no more than noise.
+    """
+    all_samples = np.ones(len(view.recording), dtype=bool)
     reading = view.reading
     if float(np.ptp(reading.values)) == 0.0:
         says = "the reading is constant: is the unit connected, and is this its column?"
     else:
-        share, moves_with = _followed_share(view) if view.load_span > 0.0 else (0.0, 0.0)
-        # A walk at random may explain half of the variance, but does not move along.
+        explained, correlation = _followed_share(view) if view.load_span > 0.0 else (0.0, 0.0)
         follows = view.thresholds.follows
-        if view.thresholds.clear * (1.0 - share) <= view.thresholds.same or (share >= follows and moves_with > 0.0):
-            return  # of a few samples a ramp, a load looks like noise: what is followed is none
-        if share >= follows and _answers(view):
+        if view.thresholds.clear * (1.0 - explained) <= view.thresholds.same or (
+            explained >= follows and correlation > 0.0
+        ):
+            return  # few samples a ramp make a load look like noise, but noise is not followed so closely
+        if explained >= follows and _answers_soon(view):
             return
-        if (stands_still := frozen(view)) is not None:
-            yield stands_still
+        if (froze := frozen(view)) is not None:
+            yield froze
             return
         memory_s = view.thresholds.memory_s
         says = (
-            f"the reading does not follow the load: load explains {100 * max(share, 0.0):.0f} % of its variance, a"
+            f"the reading does not follow the load: load explains {100 * max(explained, 0.0):.0f} % of its variance, a"
             f" curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed; is this the unit that was"
             " pressed?"
         )
-        if share >= follows:
+        if explained >= follows:
             says = (
-                f"the reading does not move with the load, though what is slow in it explains {100 * share:.0f} % of"
-                f" its variance: were both recorded by one clock, is this the unit that was pressed, and does it answer"
-                f" within {max(memory_s):g} s (of a slower one record several steps of the load)?"
+                f"the reading does not move with the load, though what is slow in it explains {100 * explained:.0f} %"
+                f" of its variance: were both recorded by one clock, is this the unit that was pressed, and does it"
+                f" answer within {max(memory_s):g} s (of a slower one record several steps of the load)?"
             )
-        if view.thresholds.clear * (went_on := _goes_on(view)) > 1.0:
+        if view.thresholds.clear * (moved_at_rest := _share_moved_at_rest(view)) > 1.0:
             says = (
-                f"the reading goes on while the load stands: {100 * went_on:.0f} % of its range is gone through"
+                f"the reading goes on while the load stands: {100 * moved_at_rest:.0f} % of its range is gone through"
                 f" more than {max(memory_s):g} s after the load's last move; whether it is the load's integral, a"
                 " slower unit or a drift cannot be told from so few levels (record several, each for a while)"
             )
-        if _is_noise(view):
+        if _load_is_noise(view):
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
-    yield Finding.fatal("does_not_follow_load", whole, says)
+    yield Finding.fatal("does_not_follow_load", all_samples, says)
 
 
 def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``wrong_sign``: a load that is negative in compression, or a pressure (or force) that falls as load rises.
+    """Kind ``wrong_sign``: a load that is negative in compression (fatal), or a pressure or force that falls with load.
 
-    Counts, volts and lengths may fall, and so may what creeps under a load that stands.
+    Counts, volts and lengths may fall with load, and so may what creeps under a load that stands.
     """
-    at, whole = view.curve[0], np.ones(len(view.recording), dtype=bool)
-    if at[-1] < -view.thresholds.same * at[0]:
+    loads, all_samples = view.curve[0], np.ones(len(view.recording), dtype=bool)
+    if loads[-1] < -view.thresholds.same * loads[0]:
         says = (
-            f"the load is negative in compression (it runs from {at[0]:.4g} to {at[-1]:.4g} N): turn its sign,"
+            f"the load is negative in compression (it runs from {loads[0]:.4g} to {loads[-1]:.4g} N): turn its sign,"
             " compression is positive (a minus before the column does so: --force '-COLUMN')"
         )
-        yield Finding.fatal("wrong_sign", whole, says)
-    elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD and not _is_noise(view):
+        yield Finding.fatal("wrong_sign", all_samples, says)
+    elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD and not _load_is_noise(view):
         name = view.recording.sensor.name
         says = f"the {name} falls as the load rises: turn the sign of one of the two (load is positive in compression)"
-        yield Finding("wrong_sign", whole, says)
+        yield Finding("wrong_sign", all_samples, says)
 
 
-def _is_noise(view: View) -> bool:
+def _load_is_noise(view: View) -> bool:
     """Whether the load covers no more than its noise: it stands, or hardly any of its samples are on a ramp.
 
-    And at least half of its variance is in its steps (von Neumann 1941): noise is as far from its last value as from
-    any other, a drive that is anywhere within a sample, but off for hours, is not.
+    At least half of its variance must be between neighbouring samples (von Neumann 1941). Noise differs from its last
+    value as much as from any other; a drive that switches within a sample, but is off for hours, does not.
     """
     load = view.load.values
     if view.load_span > 2.0 * view.load.largest * view.load.quiet_noise:
         return False
-    white = 0.5 * float(np.mean(np.diff(load) ** 2)) if load.size > 1 else 0.0
-    return float(np.var(load)) <= view.thresholds.clear * white
+    white_variance = 0.5 * float(np.mean(np.diff(load) ** 2)) if load.size > 1 else 0.0
+    return float(np.var(load)) <= view.thresholds.clear * white_variance
 
 
-def _answers(view: View) -> bool:
-    """Whether what the load does anew is answered, and soon: a unit that lags by longer than its load stays.
+def _answers_soon(view: View) -> bool:
+    """Whether changes of the load are answered within a time constant that a law may have (`answered_s`).
 
-    Its reading is anywhere at any load, and moves against it as often as with it.
+    So are those by a unit that lags longer than its load stays on one level. Its reading may be anywhere at any load,
+    and moves against the load as often as with it.
     """
     for time_constant_s in view.thresholds.memory_s:
         width_s = max(view.step_s, time_constant_s / view.thresholds.few)
@@ -102,10 +113,10 @@ def _answers(view: View) -> bool:
     return False
 
 
-def _goes_on(view: View) -> float:
-    """Share of the reading's range that it goes through while the load stands, once what laws remember by is over.
+def _share_moved_at_rest(view: View) -> float:
+    """Largest share of the reading's range that it goes through in one stretch in which the load stands.
 
-    The largest of any stretch in which the load stays within what counts as standing.
+    The beginning of each stretch is left out, for as long as laws remember a load.
     """
     given = view.thresholds
     step_s = float(view.time_s[-1] - view.time_s[0]) / min(given.bins, view.time_s.size)
@@ -113,22 +124,25 @@ def _goes_on(view: View) -> float:
     load, reading = (
         binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
     )
-    within, most, first = given.standing * view.load_span, 0.0, 0
+    standing_limit, largest, begin = given.standing * view.load_span, 0.0, 0
     settling = int(np.ceil(max(given.memory_s) / step_s))
-    for last in range(1, grid.size + 1):
-        if last == grid.size or abs(float(load[last] - load[first])) > within:
-            after = reading[first + settling : last]
-            if after.size > 2 * given.few:
-                begins, ends = np.median(after[: given.few]), np.median(after[-given.few :])
-                most = max(most, abs(float(ends - begins)))
-            first = last
-    return most / max(float(np.ptp(reading)), most, 1e-300)
+    for stop in range(1, grid.size + 1):
+        if stop == grid.size or abs(float(load[stop] - load[begin])) > standing_limit:
+            settled = reading[begin + settling : stop]
+            if settled.size > 2 * given.few:
+                start, end = np.median(settled[: given.few]), np.median(settled[-given.few :])
+                largest = max(largest, abs(float(end - start)))
+            begin = stop
+    return largest / max(float(np.ptp(reading)), largest, 1e-300)
 
 
 def _followed_share(view: View) -> tuple[float, float]:
-    """Share of the reading's variance about a straight line in time that load explains; correlation of increments.
+    """Share of the reading's variance that load explains, and how far increments of both correlate beyond chance.
 
-    About its mean where each load comes but once: time is then the load's, and no drift is told from what follows it.
+    1. Both are averaged to ``bins`` points at most.
+    2. The base is a straight line in time, since a drift is not of the load. It is the mean alone where the load only
+       rises or only falls: drift and load cannot then be told apart.
+    3. The share is that of the base's residual which a polynomial, the static curve and lags of the load take off.
     """
     n = view.reading.values.size
     width = max(1, n // view.thresholds.bins)
@@ -140,49 +154,52 @@ def _followed_share(view: View) -> tuple[float, float]:
         [load_regressors(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1
     )
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
-    if _comes_once(load, view.thresholds):
+    if _is_monotone(load, view.thresholds):
         base = base[:, :1]
-    left_base, left = _beyond(reading, base), _beyond(reading, np.concatenate([base, columns], axis=1))
-    total = float(np.dot(left_base, left_base))
+    base_residual, full_residual = _residual(reading, base), _residual(reading, np.concatenate([base, columns], axis=1))
+    total = float(np.dot(base_residual, base_residual))
     if total == 0.0:
         return 0.0, 0.0
-    together = max(
-        _moves_with(curve, reading, stride_s / (width * view.step_s), view.thresholds)
+    correlation = max(
+        _correlation_of_increments(curve, reading, stride_s / (width * view.step_s), view.thresholds)
         for stride_s in view.thresholds.memory_s
     )
-    return 1.0 - float(np.dot(left, left)) / total, together
+    return 1.0 - float(np.dot(full_residual, full_residual)) / total, correlation
 
 
-def _comes_once(load: Array, thresholds: Thresholds) -> bool:
-    """Whether a load (n,) goes one way, straight or not, and stands nowhere: its ranks are those of its moments."""
+def _is_monotone(load: Array, thresholds: Thresholds) -> bool:
+    """Whether a load (n,) only rises or only falls, and stands nowhere: its ranks are nearly in the order of time."""
     from scipy.stats import rankdata
 
-    moment, place = np.arange(1.0, load.size + 1.0), rankdata(load)
-    off = min(float(np.std(place - moment)), float(np.std(place + moment)))
+    order, ranks = np.arange(1.0, load.size + 1.0), rankdata(load)
+    off = min(float(np.std(ranks - order)), float(np.std(ranks + order)))
     return off < thresholds.standing * load.size
 
 
-def _beyond(signal: Array, columns: Array) -> Array:
-    """(n,) what ``columns`` (n, k) leave of a ``signal`` (n,)."""
+def _residual(signal: Array, columns: Array) -> Array:
+    """(n,) what the least-squares fit of ``columns`` (n, k) leaves of a ``signal`` (n,)."""
     return signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
 
 
-def _moves_with(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
-    """Correlation of increments over ``stride`` points, less what chance gives so many; large ones cut short."""
-    apart = min(max(1, round(stride)), load.size // 4)
-    d_load, d_reading = (cut_short(one[apart:] - one[:-apart], thresholds) for one in (load, reading))
-    size = float(np.sqrt(np.dot(d_load, d_load) * np.dot(d_reading, d_reading)))
-    if size == 0.0:
+def _correlation_of_increments(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
+    """Correlation of the increments of both (n,) over ``stride`` points, less what chance reaches in so few points.
+
+    The largest increments are clipped, so that a jump does not make up the correlation.
+    """
+    lag = min(max(1, round(stride)), load.size // 4)
+    d_load, d_reading = (cut_short(one[lag:] - one[:-lag], thresholds) for one in (load, reading))
+    norm = float(np.sqrt(np.dot(d_load, d_load) * np.dot(d_reading, d_reading)))
+    if norm == 0.0:
         return 0.0
-    return float(np.dot(d_load, d_reading) / size - thresholds.clear / np.sqrt(load.size / apart))
+    return float(np.dot(d_load, d_reading) / norm - thresholds.clear / np.sqrt(load.size / lag))
 
 
 def load_regressors(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
-    """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
+    """(n, 3 + k) what a unit may make of its ``load`` (n,): its share of the span, squared, cubed, behind k lags."""
     return share_regressors((load - load.min()) / np.ptp(load), step_s, time_constants_s)
 
 
-def share_regressors(f: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
-    """(n, 3 + k) a share ``f`` (n,) of a load, its square and cube, and the share behind k first-order lags."""
-    lags = [lagged(f, step_s, float(tau_s)) for tau_s in time_constants_s]
-    return np.stack([f, f**2, f**3, *lags], axis=1)
+def share_regressors(share: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
+    """(n, 3 + k) a ``share`` (n,) of the load's span, its square and cube, and it behind k first-order lags."""
+    lags = [lagged(share, step_s, float(tau_s)) for tau_s in time_constants_s]
+    return np.stack([share, share**2, share**3, *lags], axis=1)

@@ -1,4 +1,8 @@
-"""Spectral lines: hum at any frequency, its own or folded, looked for where the load rests."""
+"""Hum: spectral lines in the reading at any frequency, true or folded by sampling, looked for where the load rests.
+
+A slow polynomial is taken off the reading in each stretch of rest. A line is a peak of the spectrum that noise would
+not reach. It must be of one phase, and last: a ringing begins anew with each move of the load and dies.
+"""
 
 from __future__ import annotations
 
@@ -15,38 +19,40 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import MAINS_HZ, robust_sd
 
-HARMONICS = 3  # that a line is called by: half and twice as many changed no finding
+HARMONICS = 3  # of the mains that a line is named by: half and twice as many changed no finding
 
 
 def hum(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``hum``: one finding for all lines; nothing is masked, since every sample has it."""
+    """Kind ``hum``: one finding for all lines. None is masked, since every sample has the hum."""
     found = spectral_lines(view, bad)
     if not found:
         return
     rate_hz = 1.0 / view.step_s
-    parts = []
+    named = []
     for frequency_hz, amplitude in found:
         folded = aliases(frequency_hz, rate_hz, float(view.time_s[-1] - view.time_s[0]))
         origin = f" ({' or '.join(folded)})" if folded else ""
-        parts.append(f"{frequency_hz:.4g} Hz{origin} with {percent(amplitude / view.span)}")
+        named.append(f"{frequency_hz:.4g} Hz{origin} with {percent(amplitude / view.span)}")
     yield Finding(
         "hum",
         np.ones(len(view.recording), dtype=bool),
-        f"a hum stands in the reading also while the load rests: at {', at '.join(parts)} of its span; another"
+        f"a hum stands in the reading also while the load rests: at {', at '.join(named)} of its span; another"
         " sampling rate would tell a folded line from a true one",
     )
 
 
 def aliases(frequency_hz: float, rate_hz: float, duration_s: float) -> list[str]:
-    """Harmonics of 50 and 60 Hz that appear at ``frequency_hz`` when sampled at ``rate_hz``."""
-    near = 0.05 + 2.0 / duration_s
+    """The names of the harmonics of 50 and 60 Hz that appear at ``frequency_hz`` when sampled at ``rate_hz``."""
+    resolution_hz = 0.05 + 2.0 / duration_s
     names = []
-    for mains in MAINS_HZ:
+    for mains_hz in MAINS_HZ:
         for harmonic in range(1, HARMONICS + 1):
-            true = harmonic * mains
-            folded = abs(true - rate_hz * np.rint(true / rate_hz))
-            if abs(folded - frequency_hz) <= near + 0.001 * true:
-                names.append(f"{true:g} Hz mains" if harmonic == 1 else f"{true:g} Hz, {harmonic} x {mains:g} Hz")
+            true_hz = harmonic * mains_hz
+            folded_hz = abs(true_hz - rate_hz * np.rint(true_hz / rate_hz))
+            if abs(folded_hz - frequency_hz) <= resolution_hz + 0.001 * true_hz:
+                names.append(
+                    f"{true_hz:g} Hz mains" if harmonic == 1 else f"{true_hz:g} Hz, {harmonic} x {mains_hz:g} Hz"
+                )
                 break
     return names
 
@@ -54,7 +60,8 @@ def aliases(frequency_hz: float, rate_hz: float, duration_s: float) -> list[str]
 def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
     """Frequency in Hz and amplitude (of the reading) of each spectral line, the strongest first.
 
-    What lies beside a stronger one by less than a window over the longest rest resolves is that line, which wanders.
+    A line that lies nearer to a stronger one than a window over the longest rest resolves is the same line, which
+    wanders.
     """
     if view.span == 0.0:
         return []
@@ -77,7 +84,11 @@ def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
 
 
 def _quiet_stretches(view: View) -> list[tuple[int, int]]:
-    """Stretches (first, past last) of a few blocks and more in which the block means of the load stand still."""
+    """Stretches of rest, (first, past last) sample: a few blocks or more in which the load's block means stand still.
+
+    A block is as long as a sensor's lag. The first block of each stretch is left out, since the reading may still
+    follow the move before it.
+    """
     n, given = view.load.values.size, view.thresholds
     block = max(given.few, round(given.clear * given.echo_s / view.step_s))
     count = n // block
@@ -87,58 +98,107 @@ def _quiet_stretches(view: View) -> list[tuple[int, int]]:
     mean = blocks.mean(axis=1)
     noise = view.load.quiet_noise
     moves = given.still_per_s * view.load_span * block * view.step_s
-    still = np.abs(np.diff(mean)) <= max(moves, largest_of_noise(1, given) * np.sqrt(2.0 / block) * noise)
-    calm = blocks.std(axis=1) <= moves + given.clear * noise  # a sine of four cycles a second is not
-    still &= calm[1:] & calm[:-1]
+    is_still = np.abs(np.diff(mean)) <= max(moves, largest_of_noise(1, given) * np.sqrt(2.0 / block) * noise)
+    is_calm = blocks.std(axis=1) <= moves + given.clear * noise  # a sine of four cycles a second has equal means
+    is_still &= is_calm[1:] & is_calm[:-1]
     gap = np.flatnonzero(view.gap | (view.jump != 0.0)) // block
-    still[np.minimum(gap, still.size - 1)] = False
-    quiet = np.zeros(count, dtype=bool)
-    quiet[1:-1] = still[1:] & still[:-1]
-    starts, stops = runs_of(quiet)
-    # A block is as long as a sensor's lag: in the first of a stretch the reading may still follow the move before it.
+    is_still[np.minimum(gap, is_still.size - 1)] = False
+    is_quiet = np.zeros(count, dtype=bool)
+    is_quiet[1:-1] = is_still[1:] & is_still[:-1]
+    starts, stops = runs_of(is_quiet)
     return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a > given.few]
 
 
 def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[Array, Array]:
-    """Reading less a fifth-degree polynomial in each stretch under a Hann window, 0 elsewhere; and the window (m,)."""
+    """(m,) each: the reading less a fifth-degree polynomial in each stretch, under a Hann window; and that window.
+
+    Both are 0 elsewhere, and at samples that are ``bad`` (m,) or far off.
+    """
     y = view.reading.values
     limit = view.reading.largest * view.reading.noise + view.thresholds.clear * view.reading.step
     residual, weight = np.zeros(y.size), np.zeros(y.size)
     for first, last in stretches:
         x = np.linspace(-1.0, 1.0, last - first)
         basis = np.polynomial.legendre.legvander(x, 5)
-        part, good = y[first:last], ~bad[first:last]
-        if good.sum() < view.thresholds.local // 2:
+        reading, is_good = y[first:last], ~bad[first:last]
+        if is_good.sum() < view.thresholds.local // 2:
             continue
-        seen = basis[good]  # nearly orthogonal: their products do
-        left = part - basis @ np.linalg.lstsq(seen.T @ seen, seen.T @ part[good], rcond=None)[0]
-        window = np.hanning(last - first) * good
-        window *= np.abs(left) <= np.maximum(limit[first:last], view.reading.largest * robust_sd(left))
-        residual[first:last], weight[first:last] = left * window, window
+        rows = basis[is_good]  # nearly orthogonal, so that normal equations serve
+        off = reading - basis @ np.linalg.lstsq(rows.T @ rows, rows.T @ reading[is_good], rcond=None)[0]
+        window = np.hanning(last - first) * is_good
+        window *= np.abs(off) <= np.maximum(limit[first:last], view.reading.largest * robust_sd(off))
+        residual[first:last], weight[first:last] = off * window, window
     return residual, weight
 
 
-def _lasts(whole: float, own: Array, weight: Array, noise_power: Array, thresholds: Thresholds) -> bool:
-    """Whether one phase and one power hold in all parts.
+def _lasts(whole: float, by_part: Array, weight: Array, noise_power: Array, thresholds: Thresholds) -> bool:
+    """Whether a line has one phase and one power in all parts, as a hum has and a ringing has not.
 
-    A ringing begins anew with each move of the load, larger or smaller, and dies.
-    ``whole`` amplitude over all parts, ``own`` (p,) and ``weight`` (p,) of each, first and second half of a stretch in
-    turn; ``noise_power`` (p,) of what noise beside the line adds to its square.
+    ``whole``: the line's amplitude over all parts. ``by_part`` (p,): of each part, the first and the second half of a
+    stretch in turn. ``weight`` (p,): how much each part counts. ``noise_power`` (p,): what noise adds to the square of
+    each amplitude.
     """
     share = weight**2
-    power = share * (own**2 - noise_power)
+    power = share * (by_part**2 - noise_power)
     doubt = largest_of_noise(1, thresholds) * float(np.sqrt(share**2 @ (noise_power**2 + 2.0 * whole**2 * noise_power)))
-    coherent = thresholds.clear * whole**2 * float(share.sum()) > float(power.sum()) - doubt
-    seen = own[noise_power < (thresholds.same * max(whole, float(np.median(own)))) ** 2]
-    if seen.size >= thresholds.few and np.quantile(seen, 0.9) > thresholds.clear * np.quantile(seen, 0.1):
+    is_coherent = thresholds.clear * whole**2 * float(share.sum()) > float(power.sum()) - doubt
+    certain = by_part[noise_power < (thresholds.same * max(whole, float(np.median(by_part)))) ** 2]
+    if certain.size >= thresholds.few and np.quantile(certain, 0.9) > thresholds.clear * np.quantile(certain, 0.1):
         return False
-    return coherent and float(power[0::2].sum()) < thresholds.clear * float(power[1::2].sum()) + doubt
+    return is_coherent and float(power[0::2].sum()) < thresholds.clear * float(power[1::2].sum()) + doubt
 
 
 def _strongest(
     view: View, residual: Array, weight: Array, stretches: list[tuple[int, int]]
 ) -> tuple[float, float, Array] | None:
-    """Frequency, amplitude and course (m,) of the strongest line that passes every test, or None."""
+    """Frequency in Hz, amplitude and waveform (m,) of the strongest line that passes every test, or None.
+
+    1. Noise would not reach its power (`_peak_of_spectrum`).
+    2. From peak to peak it is material, and larger than the toggling of a silent signal between two levels.
+    3. It is as strong in the second halves of the stretches as in the first ones, where a ringing has died.
+    4. It has one phase over all stretches, though mains wander a little.
+    5. It lies on a harmonic of the mains, or it lasts (`_lasts`).
+    """
+    given = view.thresholds
+    peak = _peak_of_spectrum(view, residual)
+    if peak is None:
+        return None
+    n = residual.size
+    frequency_hz, background, fold = peak
+    carrier = np.exp(-2j * np.pi * frequency_hz * view.step_s * np.arange(n))
+    whole = fold * np.dot(residual, carrier) / weight.sum()
+    by_part, halves = [], np.zeros(2)
+    weights, noise_power = [], []
+    level = fold**2 * background / float(np.dot(weight, weight))
+    for low, high in stretches:
+        middle = (low + high) // 2
+        for i, (a, b) in enumerate(pairwise((low, middle, high))):
+            total = float(weight[a:b].sum())
+            if total > 0:
+                part = fold * np.dot(residual[a:b], carrier[a:b]) / total
+                halves[i] += abs(part) ** 2
+                by_part.append(abs(part))
+                weights.append(total)
+                noise_power.append(level * float(np.dot(weight[a:b], weight[a:b])) / total**2)
+    amplitude = max(abs(whole), float(np.median(by_part)))
+    step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
+    # The first harmonic of a toggling between two levels has an amplitude of 2/pi steps.
+    least = max(0.5 * given.material * view.span, 2.0 / np.pi * step if noise < toggling(given) * step else 0.0)
+    is_steady = halves[0] < given.clear**2 * halves[1]
+    if amplitude < least or not is_steady or given.clear**2 * abs(whole) < amplitude:
+        return None
+    from_mains = aliases(frequency_hz, 1.0 / view.step_s, float(n * view.step_s))
+    if not from_mains and not _lasts(abs(whole), np.array(by_part), np.array(weights), np.array(noise_power), given):
+        return None
+    waveform: Array = np.real(whole * np.conj(carrier))
+    return frequency_hz, float(amplitude), waveform
+
+
+def _peak_of_spectrum(view: View, residual: Array) -> tuple[float, float, float] | None:
+    """The strongest peak in the spectrum of a ``residual`` (n,) that noise would not reach, or None.
+
+    Its frequency in Hz, the mean power of the noise around it, and how many sides of the spectrum hold it, 1 or 2.
+    """
     from scipy.fft import next_fast_len, rfft
     from scipy.ndimage import median_filter
 
@@ -147,45 +207,18 @@ def _strongest(
     power = np.abs(rfft(residual, size)) ** 2
     frequency = np.fft.rfftfreq(size, view.step_s)
     given = view.thresholds
-    lowest_hz = given.few / given.hold_s  # below, a line is drift or physics
+    lowest_hz = given.few / given.hold_s  # what is slower may be drift or the unit's physics
     first = int(np.searchsorted(frequency, lowest_hz))
     if power.size - first < 64 or not power[first:].any():
         return None
     width = max(1, round(lowest_hz / float(frequency[1])) // 64)
     coarse = power[: power.size // width * width].reshape(-1, width)
     smooth = median_filter(np.median(coarse, axis=1), 65, mode="mirror") / np.log(2.0)
-    local = smooth[np.minimum(np.arange(power.size) // width, smooth.size - 1)]
-    ratio = power / np.maximum(local, 1e-300)
+    background = smooth[np.minimum(np.arange(power.size) // width, smooth.size - 1)]
+    ratio = power / np.maximum(background, 1e-300)
     ratio[:first] = 0.0
-    sure = np.log(n / given.false_alarm)  # noise has an exponential law of power
-    best = int(np.argmax(np.where(np.isfinite(ratio), power * (ratio > sure), 0.0)))
-    if ratio[best] <= sure:
+    limit = np.log(n / given.false_alarm)  # the power of noise has an exponential law
+    best = int(np.argmax(np.where(np.isfinite(ratio), power * (ratio > limit), 0.0)))
+    if ratio[best] <= limit:
         return None
-    carrier = np.exp(-2j * np.pi * float(frequency[best]) * view.step_s * np.arange(n))
-    folded = 2.0 if 0 < best < size // 2 else 1.0
-    whole = folded * np.dot(residual, carrier) / weight.sum()
-    own, halves = [], np.zeros(2)
-    weights, noise_power = [], []
-    level = folded**2 * float(local[best]) / float(np.dot(weight, weight))
-    for low, high in stretches:
-        middle = (low + high) // 2
-        for i, (a, b) in enumerate(pairwise((low, middle, high))):
-            total = float(weight[a:b].sum())
-            if total > 0:
-                part = folded * np.dot(residual[a:b], carrier[a:b]) / total
-                halves[i] += abs(part) ** 2
-                own.append(abs(part))
-                weights.append(total)
-                noise_power.append(level * float(np.dot(weight[a:b], weight[a:b])) / total**2)
-    amplitude = max(abs(whole), float(np.median(own)))
-    step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
-    # From peak to peak it must be material; the first line of a toggling between two levels has 2/pi of a step.
-    least = max(0.5 * given.material * view.span, 2.0 / np.pi * step if noise < toggling(given) * step else 0.0)
-    steady = halves[0] < given.clear**2 * halves[1]  # first halves of the stretches against second ones: ringing dies
-    if amplitude < least or not steady or given.clear**2 * abs(whole) < amplitude:  # mains wander a little
-        return None
-    from_mains = aliases(float(frequency[best]), 1.0 / view.step_s, float(n * view.step_s))
-    if not from_mains and not _lasts(abs(whole), np.array(own), np.array(weights), np.array(noise_power), given):
-        return None
-    course: Array = np.real(whole * np.conj(carrier))
-    return float(frequency[best]), float(amplitude), course
+    return float(frequency[best]), float(background[best]), 2.0 if 0 < best < size // 2 else 1.0

@@ -1,4 +1,4 @@
-"""Quantisation: a grid of values that is coarse beside the signal and beside its noise."""
+"""Quantisation: readings lie on a grid that is coarse beside the signal and beside its noise."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from smartshoe.signals.noise import UNIFORM_SD
 
 
 def coarse_step(values: Array, thresholds: Thresholds) -> float:
-    """The usual step of the grid that readings (n,) lie on; 0 where there is none, or noise takes it out in the mean.
+    """The usual step of the grid on which readings ``values`` (n,) lie; 0 without a grid, or if noise averages it out.
 
-    Whatever the load does: also where that stands still, and the reading's standing is no fault of its grid.
+    The load does not matter: readings that stand with their load count as well.
     """
     if not values.size:
         return 0.0
@@ -28,18 +28,18 @@ def coarse_step(values: Array, thresholds: Thresholds) -> float:
 
 
 def _usual(step: Array, thresholds: Thresholds) -> float:
-    """The median of steps (n,), 0 where too few readings lie on a grid.
+    """The median of local grid steps ``step`` (n,); 0 where too few readings lie on a grid.
 
-    Beyond what is often read the distance between neighbours is no step.
+    Of values that are seldom read the distance between neighbours is no step.
     """
     on_grid = step > 0.0
     return float(np.median(step[on_grid])) if on_grid.mean() >= 1.0 - thresholds.same else 0.0
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``quantisation``; nothing is masked, since every sample has it.
+    """Kind ``quantisation``. None is masked, since every sample has it.
 
-    A grid adds an error. It is a fault where that is material, and no noise hides it.
+    It is a fault where the grid's rounding error is material and no noise averages it out.
     """
     usual = _usual(view.reading.local_step, view.thresholds)
     if usual == 0.0 or view.span == 0.0 or not _stands_while_load_moves(view):
@@ -58,16 +58,16 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
 
 
 def _is_hidden(error: float, reading: Signal) -> bool:
-    """Whether an ``error`` is less than the share of the noise by which two noises count as the same.
-
-    More noise dithers the grid and hides it.
-    """
+    """Whether a rounding ``error`` is less than a share (`same`) of the reading noise, which averages a grid out."""
     noise = float(np.sqrt(max(reading.quiet_noise**2 - error**2, 0.0)))
     return error < reading.thresholds.same * noise
 
 
 def _stands_while_load_moves(view: View) -> bool:
-    """Whether a reading stays on a level while the load goes on; a noiseless reading of a load in steps does not."""
+    """Whether the reading stays on levels of the grid while the load goes on.
+
+    The reading of a load in steps, without noise, stands as well, but with its load.
+    """
     starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
     moved = view.gain * np.abs(view.steady_load[stops] - view.steady_load[starts])
     is_beyond = moved > view.thresholds.same * view.reading.local_step[starts]

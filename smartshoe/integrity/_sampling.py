@@ -1,4 +1,4 @@
-"""What the time base and the masks of missing samples say by themselves."""
+"""Faults that the time base and the masks of missing samples show by themselves: too short, gaps, uneven steps."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import robust_sd
 
 
-def short_recording(recording: Recording, thresholds: Thresholds, is_rest: bool = False) -> Iterator[Finding]:
-    """Kind ``short_recording``: fatal, since so little shows nothing, nor what is over before a reading answers.
+def short_recording(recording: Recording, thresholds: Thresholds, is_thinned: bool = False) -> Iterator[Finding]:
+    """Kind ``short_recording``, fatal: too few samples to show anything, or over before a reading answers its load.
 
-    ``is_rest``: samples were left out, of which other findings tell.
+    ``is_thinned``: samples were left out, which other findings tell.
     """
     held = f"{len(recording)} samples in {moment(recording.duration_s, 3)} s" if len(recording) > 1 else "one sample"
     if len(recording) < thresholds.least_samples:
@@ -30,13 +30,13 @@ def short_recording(recording: Recording, thresholds: Thresholds, is_rest: bool 
         )
     else:
         return
-    rest = ", without those that are no measurements of their own" if is_rest else ""
-    says = f"the recording holds {held}{rest}: {mend}"
+    left_out = ", without those that are no measurements of their own" if is_thinned else ""
+    says = f"the recording holds {held}{left_out}: {mend}"
     yield Finding.fatal("short_recording", np.ones(len(recording), dtype=bool), says)
 
 
 def missing_samples(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
-    """Kind ``missing_samples``: rows in which load or reading was not there; masked."""
+    """Kind ``missing_samples``; masked: rows in which load or reading is missing. One finding a channel."""
     for role, what in (("load", "reference load"), ("sensor", "reading")):
         for channel in recording.of_role(role):  # type: ignore[arg-type]
             absent = ~channel.present
@@ -62,14 +62,14 @@ def missing_samples(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
 
 
 def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
-    """Kind ``gaps``: steps of time in which rows are missing; what lies beside a gap stays in use."""
+    """Kind ``gaps``: steps of time in which rows are missing. Samples beside a gap stay in use."""
     step = np.diff(recording.time_s)
     usual = float(np.median(step))
-    # A sample is missing from one and a half steps on, if steps are even enough to tell. They are never negative, so
-    # that they scatter by ratios: of a log without a clock a step in a thousand is several times the usual one.
+    # A sample is missing from one and a half steps on, where steps are even enough to tell. Steps are positive and
+    # scatter by ratios: in a log without a clock one step in a thousand is several times the usual one.
     ratio = np.log(step / usual)
     wide = ratio > max(math.log(1.5), largest_of_noise(step.size, thresholds) * robust_sd(ratio))
-    # A larger share of such steps is how the logger works, which uneven sampling says.
+    # A larger share of such steps is how the logger works, and is reported as uneven sampling.
     if not wide.any() or wide.mean() > thresholds.faulty_share:
         return
     lost = int(np.rint(step[wide] / usual - 1.0).sum())
@@ -87,7 +87,7 @@ def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
 
 
 def uneven_sampling(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
-    """Kind ``uneven_sampling``: steps that differ all along, or a rate that changes."""
+    """Kind ``uneven_sampling``: the steps differ throughout the recording, or the sampling rate changes."""
     step = np.diff(recording.time_s)
     usual = float(np.median(step))
     away = np.abs(step - usual) / usual

@@ -1,4 +1,7 @@
-"""`View`: one recording as the detectors see it: load and reading on one clock, their scales, the static curve."""
+"""`View`: one recording as the detectors see it: load and reading on one clock, their scales, the static curve.
+
+All scales are computed when first asked for, and rest on medians where faults must not move them.
+"""
 
 from __future__ import annotations
 
@@ -25,52 +28,53 @@ from smartshoe.stamps import usual_step_s
 
 
 def toggling(thresholds: Thresholds) -> float:
-    """In grid steps, no clear noise: half a step is what the toggling of a silent signal between two looks like."""
+    """Noise in grid steps that is no clear noise: a silent signal that toggles between two levels shows half a step."""
     return 0.5 * math.sqrt(thresholds.clear)
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A channel at the samples where load and reading are both present: ``values`` (m,) with their scales."""
+    """A channel at the m samples where load and reading are both present: ``values`` (m,) with their scales."""
 
     values: Array
     thresholds: Thresholds
 
     @cached_property
     def largest(self) -> float:
-        """What noise reaches in the whole recording, in standard deviations."""
+        """How many standard deviations noise reaches in the whole recording."""
         return largest_of_noise(self.values.size, self.thresholds)
 
     @cached_property
     def levels(self) -> tuple[Array, Index]:
-        """The values that occur, increasing, and how often each does."""
+        """The values that occur, increasing, and how often each occurs, (l,) each."""
         values, count = np.unique(self.values, return_counts=True)
         return values, count.astype(np.intp)
 
     @cached_property
     def step(self) -> float:
-        """The grid's step, 0 where there is none."""
+        """The grid's step, 0 where no grid is found."""
         return grid_step(*self.levels, self.thresholds)
 
     @cached_property
     def least_gap(self) -> Array:
-        """(m,) the smallest difference between values near each reading that differ: no grid's step is larger there."""
+        """(m,) smallest difference between values that occur near each value: a grid's step is not larger there."""
         from scipy.ndimage import minimum_filter1d
 
         levels = self.levels[0]
         if levels.size < 2:
             return np.zeros(self.values.size)
         gaps = np.diff(levels)
-        beside = max(self.thresholds.local, round(self.thresholds.standing * gaps.size))
-        least = minimum_filter1d(np.append(gaps, gaps[-1]), beside)
+        width = max(self.thresholds.local, round(self.thresholds.standing * gaps.size))
+        least = minimum_filter1d(np.append(gaps, gaps[-1]), width)
         return least[np.searchsorted(levels, self.values)]
 
     @cached_property
     def local_step(self) -> Array:
-        """(m,) the grid's step at each reading, 0 where it lies on none.
+        """(m,) the grid's step at each reading, 0 where it lies on no grid.
 
-        Where the grid is uneven (a logarithmic code) or part of the readings lie on it (a converter with two ranges),
-        the distance between neighbours among the values that come back after others: noise takes none of its own twice.
+        Where the grid is uneven (a logarithmic code), or part of the readings lie on it (a converter with two ranges),
+        it is the distance between neighbours among those values to which the signal comes back after others: values by
+        noise alone do not recur.
         """
         if self.step > 0.0:
             return np.full(self.values.size, self.step)
@@ -79,46 +83,51 @@ class Signal:
         levels = values[visits > 1]
         if levels.size < 3:
             return np.zeros(self.values.size)
-        place = np.minimum(np.searchsorted(levels, self.values), levels.size - 1)
-        on = levels[place] == self.values
-        # A peak may touch a level once: where most readings lie on a grid all do.
-        return np.where(on | (on.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[place], 0.0)
+        nearest = np.minimum(np.searchsorted(levels, self.values), levels.size - 1)
+        is_on_level = levels[nearest] == self.values
+        # A peak may touch a level only once. Where most readings lie on a grid, all are taken to.
+        return np.where(
+            is_on_level | (is_on_level.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[nearest], 0.0
+        )
 
     @cached_property
     def is_noisy(self) -> bool:
-        """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
+        """Whether second differences change sign more often than not, as of noise, by more than one grid step."""
         turned, stayed = turns(np.diff(self.values, 2))
         least = max(toggling(self.thresholds) * self.step, self.thresholds.material * float(np.ptp(self.values)))
         return bool(turned.sum() > stayed.sum()) and self.quiet_noise > least
 
     @cached_property
     def outlying(self) -> Array:
-        """(m,) values less their running five-point median: 0 at both ends and on monotone stretches without noise."""
-        out: Array = self.values - five_point_median(self.values)
-        out[:2] = out[-2:] = 0.0
-        return out
+        """(m,) values less their running five-point median.
+
+        0 at both ends, and wherever values only rise or only fall without noise.
+        """
+        off: Array = self.values - five_point_median(self.values)
+        off[:2] = off[-2:] = 0.0
+        return off
 
     @cached_property
     def noise(self) -> Array:
-        """(m,) local standard deviation of white noise; none of what is switched between a few levels."""
+        """(m,) local standard deviation of white noise; 0 for a signal that is switched between a few levels."""
         if self.is_switched:
             return np.zeros(self.values.size)
         return white_noise(self.values, self.thresholds, self.step)
 
     @cached_property
     def is_switched(self) -> bool:
-        """Whether it takes a few values only and stays on them, so that its steps are no noise."""
+        """Whether the signal takes only a few values and stays on each, so that its steps are no noise."""
         return is_switched(self.values, self.thresholds.few, self.thresholds.false_alarm)
 
     @cached_property
     def quiet_noise(self) -> float:
-        """The recording's usual noise: median of the local ones."""
+        """The usual noise of the recording: the median of the local standard deviations."""
         return float(np.median(self.noise))
 
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Readings, as recorded, to which a unit's sensor drops out, ``dropouts`` (v,), and where it ends, ``rails``."""
+    """Values, as recorded, to which a unit's sensor drops out, ``dropouts`` (d,), and where it ends, ``rails`` (r,)."""
 
     dropouts: Array
     rails: Array
@@ -129,11 +138,11 @@ UNKNOWN_ENDS = Ends(np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A recording with both signals.
+    """A recording with both signals at the m samples ``index`` (m,) where both are present.
 
-    ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
-    is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
-    ``ends``: what all recordings tell of the unit's sensor. ``is_swapped``: load and reading have changed places.
+    ``reading`` is turned so that it rises with load (``sign`` is -1 where it was turned). ``load`` is set on the
+    reading's clock by the lag ``offset_s`` + ``rate`` (t - middle). ``ends``: what all recordings show of the unit's
+    sensor. ``is_swapped``: load and reading have changed places.
     """
 
     recording: Recording
@@ -155,58 +164,61 @@ class View:
 
     @cached_property
     def near(self) -> int:
-        """Samples within which a corner of the load and its echo in the reading may lie."""
+        """How many samples after a corner of the load the reading may answer it."""
         return max((self.thresholds.few + 1) // 2, round(self.thresholds.echo_s / self.step_s))
 
     @cached_property
     def gap(self) -> Mask:
-        """(m - 1,) increments of time in which a sample is missing."""
+        """(m - 1,) increments of time in which at least one sample is missing."""
         return np.diff(self.time_s) > 1.5 * self.step_s
 
     @cached_property
     def curve(self) -> tuple[Array, Array]:
-        """Loads (bins,) and median reading at each: the static curve, whatever its shape."""
+        """The static curve: mean load (bins,) and median reading (bins,) in even bins of load, increasing."""
         load, reading = self.load.values, self.reading.values
         steady = five_point_median(load)  # without spikes
         bins = round(1.0 / self.thresholds.standing)
         edges = np.linspace(steady.min(), steady.max(), bins + 1)[1:-1]
-        place = np.searchsorted(edges, load)
-        order = np.lexsort((reading, place))
-        counts = np.bincount(place, minlength=bins)
+        bin_of = np.searchsorted(edges, load)
+        order = np.lexsort((reading, bin_of))
+        counts = np.bincount(bin_of, minlength=bins)
         starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
         filled = counts > 0
         first, size = starts[filled], counts[filled]
-        middle = reading[order][first + size // 2]
-        at = np.bincount(place, weights=load, minlength=bins)[filled] / size
-        return at, middle
+        readings = reading[order][first + size // 2]
+        loads = np.bincount(bin_of, weights=load, minlength=bins)[filled] / size
+        return loads, readings
 
     @cached_property
     def noise_at_load(self) -> Array:
-        """(m,) the usual noise at each sample's load, by the upper quartile: also that of a rest beside a ramp."""
+        """(m,) standard deviation of the usual noise at each sample's load: the upper quartile, by second differences.
+
+        The upper quartile, so that a rest beside a ramp has the ramp's noise.
+        """
         from scipy.special import ndtri
 
         edges = self.curve[0][:-1] + 0.5 * np.diff(self.curve[0])
-        place = np.searchsorted(edges, self.load.values)
-        second = np.zeros(place.size)
+        bin_of = np.searchsorted(edges, self.load.values)
+        second = np.zeros(bin_of.size)
         second[1:-1] = np.abs(np.diff(self.reading.values, 2))
         usual = np.zeros(edges.size + 1)
-        order = np.argsort(place, kind="stable")
-        cuts = np.searchsorted(place[order], np.arange(edges.size + 2))
+        order = np.argsort(bin_of, kind="stable")
+        bounds = np.searchsorted(bin_of[order], np.arange(edges.size + 2))
         for i in range(usual.size):
-            if cuts[i + 1] > cuts[i]:
-                part, rank = second[order[cuts[i] : cuts[i + 1]]], 3 * (cuts[i + 1] - cuts[i]) // 4
+            if bounds[i + 1] > bounds[i]:
+                part, rank = second[order[bounds[i] : bounds[i + 1]]], 3 * (bounds[i + 1] - bounds[i]) // 4
                 usual[i] = np.partition(part, rank)[rank]
-        return usual[place] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
+        return usual[bin_of] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
 
     @cached_property
     def expected(self) -> Array:
-        """(m,) the static curve at each sample's load."""
-        at, middle = self.curve
-        return np.interp(self.load.values, at, middle)
+        """(m,) the static curve's reading at each sample's load."""
+        loads, readings = self.curve
+        return np.interp(self.load.values, loads, readings)
 
     @cached_property
     def rest(self) -> float:
-        """The reading of the unloaded unit."""
+        """The reading of the unloaded unit, by the static curve."""
         return float(self.curve[1][0])
 
     @cached_property
@@ -216,55 +228,55 @@ class View:
 
     @cached_property
     def load_span(self) -> float:
-        """What the load covers, spikes left out."""
+        """What the load covers, by the static curve: without spikes."""
         return float(np.ptp(self.curve[0]))
 
     @cached_property
     def gain(self) -> float:
-        """Reading per load that no stretch of the static curve exceeds much: the steepest of its stretches."""
-        at, middle = self.curve
-        if at.size < 2 or self.load_span == 0.0:
+        """The steepest slope of the static curve, in reading per load, over a quarter (`same`) of the load's span."""
+        loads, readings = self.curve
+        if loads.size < 2 or self.load_span == 0.0:
             return 0.0
-        stretch = self.thresholds.same * self.load_span
-        low = at[at <= at[-1] - stretch]
-        rise = np.interp(low + stretch, at, middle) - np.interp(low, at, middle)
-        return float(np.max(np.abs(rise)) / stretch)
+        length = self.thresholds.same * self.load_span
+        begins = loads[loads <= loads[-1] - length]
+        rise = np.interp(begins + length, loads, readings) - np.interp(begins, loads, readings)
+        return float(np.max(np.abs(rise)) / length)
 
     @cached_property
     def load_corner(self) -> Array:
-        """(m,) change of the load's increment nearby: what a corner of the load may do to the reading, in load."""
+        """(m,) the largest change nearby of the load's increment: what its corners may do to the reading, in load."""
         return slope_change(self.load.values, self.load.noise, self.near, self.load.largest)
 
     @cached_property
     def reading_corner(self) -> Array:
-        """(m,) the same of the reading."""
+        """(m,) the largest change nearby of the reading's increment."""
         return slope_change(self.reading.values, self.reading.noise, self.near, self.reading.largest)
 
     @cached_property
     def steady_load(self) -> Array:
-        """(m,) the load's mean over ``near`` samples."""
+        """(m,) the load's running mean over ``near`` samples."""
         from scipy.ndimage import uniform_filter1d
 
         return uniform_filter1d(self.load.values, self.near, mode="nearest")
 
     @cached_property
     def load_move(self) -> Array:
-        """(m - 1,) largest increment of the load nearby, noise left out."""
+        """(m - 1,) the largest increment of the load nearby, noise left out."""
         from scipy.ndimage import maximum_filter1d
 
         step = np.abs(np.diff(self.steady_load))
         noise = np.sqrt(2.0) * self.load.largest * self.load.quiet_noise
-        sharp = np.maximum(np.abs(np.diff(self.load.values)) - noise - self.load.step, 0.0)
-        return maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
+        at_once = np.maximum(np.abs(np.diff(self.load.values)) - noise - self.load.step, 0.0)
+        return maximum_filter1d(np.maximum(step, at_once), 2 * self.near + 1, mode="nearest")
 
     @cached_property
     def reading_move(self) -> Array:
-        """(m - 1,) usual increment of the reading nearby."""
+        """(m - 1,) the usual increment of the reading nearby."""
         return local_scale(np.diff(self.reading.values), self.thresholds)
 
     @cached_property
     def jump(self) -> Array:
-        """(m - 1,) increments of the reading beyond what load, local slope, noise and grid explain; signed, else 0.
+        """(m - 1,) increments of the reading, signed, beyond what load, slope nearby, noise and grid explain; else 0.
 
         Increments over gaps of time count as explained.
         """
@@ -276,24 +288,24 @@ class View:
         allowed = np.maximum(
             allowed + np.sqrt(2.0) * self.reading.largest * noise, self.thresholds.material * self.span
         )
-        excess = np.where(np.abs(step) > allowed, step, 0.0)
-        excess[self.gap] = 0.0
-        return excess
+        jump = np.where(np.abs(step) > allowed, step, 0.0)
+        jump[self.gap] = 0.0
+        return jump
 
     @cached_property
     def jitter_reach(self) -> Array:
-        """(m,) what an error of the sampling time may bring into each reading; 0 unless noise follows the slope.
+        """(m,) what an error of the sampling time may bring into each reading; 0 unless the noise grows with the slope.
 
-        Where ramps are much noisier than rests, noise over slope is an error of time, and a rest beside a ramp may
-        hold any reading that the ramp takes within a few of those.
+        Where ramps are much noisier than rests, noise over slope is the usual error of time. A rest beside a ramp may
+        then hold any reading that the ramp takes within a few such errors.
         """
         from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
         nothing = np.zeros(self.time_s.size)
         slope = np.abs(np.gradient(self.expected_steadily, self.step_s))
         given = self.thresholds
-        usual = float(np.quantile(slope, 1.0 - given.standing))  # not the one corner that a step of load makes
-        steep, flat = given.clear * slope > usual, slope < given.faulty_share * usual
+        steepest = float(np.quantile(slope, 1.0 - given.standing))  # a quantile leaves out a single step of load
+        steep, flat = given.clear * slope > steepest, slope < given.faulty_share * steepest
         if min(steep.sum(), flat.sum()) < given.least_samples:
             return nothing
         if np.median(self.reading.noise[steep]) < given.clear * np.median(self.reading.noise[flat]):
@@ -305,24 +317,24 @@ class View:
 
     @cached_property
     def expected_steadily(self) -> Array:
-        """(m,) the static curve at each sample's load, the load's noise averaged."""
+        """(m,) the static curve's reading at each sample's averaged load."""
         return np.interp(self.steady_load, *self.curve)
 
     def turned(self) -> View:
-        """The same with the reading turned over."""
+        """The same recording with the reading turned over."""
         return replace(self, reading=Signal(-self.reading.values, self.thresholds), sign=-self.sign)
 
     def upside_down(self) -> View:
-        """The same with load and reading turned over: the loaded end is the unloaded one."""
+        """The same with load and reading both turned over, so that the loaded end is the unloaded one."""
         load, reading = (Signal(-one.values, self.thresholds) for one in (self.load, self.reading))
         return replace(self, load=load, reading=reading, sign=-self.sign)
 
     def swapped(self) -> View:
-        """The reading for the load and the load for the reading, of which no ends are known."""
+        """The same with reading and load in each other's place; the ends of such a reading are not known."""
         return replace(self, load=self.reading, reading=self.load, sign=1, ends=UNKNOWN_ENDS, is_swapped=True)
 
     def whole(self, at: Mask) -> Mask:
-        """A mask (m,) over this view as one over all of the recording's samples."""
+        """(n,) a mask over all samples of the recording from one over those of this view, ``at`` (m,)."""
         out = np.zeros(len(self.recording), dtype=bool)
         out[self.index[at]] = True
         return out

@@ -1,4 +1,8 @@
-"""Wild values: a logger's -9999, a load cell's glitch. They are taken out before anything else is asked of a signal."""
+"""Wild values: a logger's -9999 for nothing, a load cell's glitch. They are taken out before all other detectors.
+
+A few of them would make up the span of the signal, and with it all that is judged by the span: its sign, its full
+scale, its noise.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +18,17 @@ from smartshoe.signals.masks import runs_of
 
 
 def without_wild(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
-    """Load and reading without samples that leap an order of magnitude beyond the span of nearly all others.
+    """Load and reading without samples that leap far beyond the span of nearly all others, and the findings of them.
 
-    A few of them would make up the span of the signal, and what follows from it: its sign, its full scale, its noise.
-    What load and reading do together was a press; but where both are one number, it is a logger's for nothing.
+    What load and reading do together was a press of the unit. But where both show the same number, it is one that a
+    logger writes for a missing value.
     """
     channels = recording.loads_and_sensors
     wild = {channel.name: _wild(channel, thresholds) for channel in channels}
-    pressed = _together(channels, wild)
+    is_press = _together(channels, wild)
     findings = []
     for channel in channels:
-        at = wild[channel.name] & ~pressed
+        at = wild[channel.name] & ~is_press
         if not at.any():
             continue
         recording = with_missing(recording, channel, at)
@@ -42,7 +46,7 @@ def without_wild(recording: Recording, thresholds: Thresholds) -> tuple[Recordin
 
 
 def _together(channels: Sequence[Channel], wild: Mapping[str, Mask]) -> Mask:
-    """(n,) True where all channels are far beyond, each by a number of its own."""
+    """(n,) True where all ``channels`` are wild, each by a number of its own."""
     if len(channels) < 2:
         return np.zeros(channels[0].values.size if channels else 0, dtype=bool)
     values = np.stack([channel.values for channel in channels])
@@ -50,32 +54,33 @@ def _together(channels: Sequence[Channel], wild: Mapping[str, Mask]) -> Mask:
 
 
 def _wild(channel: Channel, thresholds: Thresholds) -> Mask:
-    """(n,) True at a few values that leap beyond nearly all others by ten times their span, and back.
+    """(n,) True at a few values of a ``channel`` that leap beyond nearly all others by ten times their span, and back.
 
-    For a few samples at a time, or for longer where they are one number, which stands for nothing. Several with which
-    the recording begins or ends leapt from nowhere: a ramp that it caught the end of, unless they are one number.
+    A run of them is ``few`` samples long at most, or longer where it is one number, which is no measurement. A run of
+    several values at the beginning or the end of the recording leapt from nowhere: it may be a ramp that was caught in
+    part.
     """
-    wild = np.zeros(channel.values.size, dtype=bool)
+    is_wild = np.zeros(channel.values.size, dtype=bool)
     values = channel.values[channel.present]
     if values.size < thresholds.least_samples:
-        return wild
+        return is_wild
     low, high = np.quantile(values, [0.5 * thresholds.faulty_share, 1.0 - 0.5 * thresholds.faulty_share])
     beyond = channel.values - np.clip(channel.values, low, high)
-    far = channel.present & (np.abs(beyond) > thresholds.extrapolates * (high - low))
-    if not high > low or far.mean() > 0.5 * thresholds.faulty_share:
-        return wild
+    is_far = channel.present & (np.abs(beyond) > thresholds.extrapolates * (high - low))
+    if not high > low or is_far.mean() > 0.5 * thresholds.faulty_share:
+        return is_wild
     leap = np.abs(np.diff(beyond, prepend=0.0, append=0.0))  # into each sample, and out of the last
-    for first, last in zip(*runs_of(far), strict=True):
+    for first, last in zip(*runs_of(is_far), strict=True):
         run = channel.values[first:last]
-        if np.ptp(run) > 0.0 and (last - first > thresholds.few or first == 0 or last == far.size):
+        if np.ptp(run) > 0.0 and (last - first > thresholds.few or first == 0 or last == is_far.size):
             continue
         leaps = (leap[first] > 0.5 * abs(beyond[first]), leap[last] > 0.5 * abs(beyond[last - 1]))
-        wild[first:last] = all(leaps)
-    return wild
+        is_wild[first:last] = all(leaps)
+    return is_wild
 
 
 def with_missing(recording: Recording, channel: Channel, at: Mask) -> Recording:
-    """``recording`` whose ``channel`` lacks the samples ``at`` (n,)."""
+    """``recording`` without the samples ``at`` (n,) of its ``channel``."""
     values = channel.with_nan().copy()
     values[at] = np.nan
     return recording.with_channel(channel.with_values(values))

@@ -14,16 +14,16 @@ from smartshoe.errors import UsageError
 def threshold(
     value: Any, unit: str, meaning: str, origin: str, least: float | None = None, most: float = math.inf
 ) -> Any:
-    """A field of `Thresholds` with its documentation: from ``least`` to ``most``, above 0 where there is no least."""
+    """A field of `Thresholds` with its documentation, from ``least`` to ``most``; above 0 where ``least`` is None."""
     documented = {"unit": unit, "meaning": meaning, "origin": origin}
     return field(default=value, metadata={**documented, "least": least, "most": most})
 
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """What a diagnosis decides by. Carried in the result and printed in the page; `described` lists it.
+    """The numbers that a diagnosis decides by. Carried in the result and printed in the page; `described` lists them.
 
-    Raises `UsageError` for what nothing can be decided by: no finite number, one beyond its bounds, a count that is not
+    Raises `UsageError` for numbers by which nothing can be decided: not finite, beyond the bounds, a count that is not
     whole, time constants that do not rise.
     """
 
@@ -199,7 +199,7 @@ class Thresholds:
     idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
 
     def __post_init__(self) -> None:
-        """Refuse what nothing can be decided by."""
+        """Refuse numbers by which nothing can be decided."""
         for one in fields(self):
             given, several = getattr(self, one.name), isinstance(one.default, tuple)
             for value in given if several and isinstance(given, tuple) else (given,):
@@ -215,31 +215,32 @@ class Thresholds:
 
     @property
     def few(self) -> int:
-        """How many samples or runs are no chance: a ``faulty_share`` of the fewest samples."""
+        """How many samples or runs are more than chance: a ``faulty_share`` of ``least_samples``."""
         return max(round(self.faulty_share * self.least_samples), 1)
 
     @property
     def sensor_lag_s(self) -> float:
-        """A shorter lag may be the sensor's own, a longer one is of two clocks: clear of any echo."""
+        """The longest lag that may be the sensor's own, in s; a longer one is of two clocks."""
         return self.clear * self.echo_s
 
     @property
     def settled_s(self) -> float:
-        """When any sensor's lag is over: a reading has come to its zero."""
+        """Time in s after which the lag of any sensor is over, and a reading has come to its zero."""
         return self.clear * self.sensor_lag_s
 
     @property
     def lasting_s(self) -> float:
-        """What lasts as long is no matter of moments, but a drift: clear of the shortest hold that shows creep."""
+        """Time in s from which on a change is a drift: clearly longer than the shortest hold that shows creep."""
         return self.clear * self.hold_s
 
     @property
     def cycle(self) -> float:
-        """Share by which a load rises and falls in a cycle: clear of what is clear of standing still."""
+        """Share of the span by which a load must rise and fall to make a cycle: well beyond standing still."""
         return self.clear**2 * self.standing
 
 
 def _is_within(value: object, one: Field[Any]) -> bool:
+    """Whether ``value`` is a finite number of the field's kind, within its bounds."""
     if isinstance(value, bool) or not isinstance(value, Integral if isinstance(one.default, int) else Real):
         return False
     least, number = one.metadata["least"], float(value)
@@ -261,10 +262,11 @@ def _asked(one: Field[Any]) -> str:
 
 
 def decided_by(given: Thresholds | None, material: float | None = None) -> Thresholds:
-    """``given`` or the usual, with ``material`` where there is one; `UsageError` for what are no thresholds.
+    """``given`` or the usual thresholds, with ``material`` where it is given; raises `UsageError` for anything else.
 
-    Who asks for less than is usually ``material`` has better units: what imperfections of theirs add up to is less by
-    as much. Who asks for more has the units that others have, and looks at what is large.
+    A smaller ``material`` than usual is asked for units that are better than usual: their imperfections, and what these
+    add up to, are then smaller by the same factor. A larger one is asked for usual units, of which only large effects
+    matter.
     """
     if given is not None and not isinstance(given, Thresholds):
         raise UsageError(f"thresholds is of type {type(given).__name__}: give Thresholds, or none for the usual ones")
@@ -277,7 +279,7 @@ def decided_by(given: Thresholds | None, material: float | None = None) -> Thres
 
 
 def described(given: Thresholds) -> list[dict[str, Any]]:
-    """Name, value, unit, meaning and origin of each; of one that is not the usual, what is usual too."""
+    """Name, value, unit, meaning and origin of each threshold; where it is not the usual one, the usual one as well."""
     return [_described(one, getattr(given, one.name)) for one in fields(given)]
 
 
@@ -288,7 +290,7 @@ def _described(one: Field[Any], value: Any) -> dict[str, Any]:
 
 
 def largest_of_noise(count: int, thresholds: Thresholds) -> float:
-    """What the largest of ``count`` normal deviates exceeds, in standard deviations, by a false alarm only."""
+    """How many standard deviations the largest size among ``count`` normal deviates exceeds by a false alarm only."""
     from scipy.special import ndtri
 
     return -float(ndtri(0.5 * thresholds.false_alarm / count))

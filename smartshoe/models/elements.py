@@ -34,10 +34,10 @@ GAS_SHARE = 1.6 / 0.6  # heat's share for one of the reading: N/(N - 1) at the u
 
 
 def relaxing(share: float, rate_per_s: float) -> Element:
-    """What makes a held reading creep up by a ``share`` of itself, or fall where it is negative, to first order.
+    """Element by which a held reading creeps up by a ``share`` of itself, or falls if it is negative, to first order.
 
-    An arm of negative stiffness would make it fall, too, but such a network oscillates or runs away beside another
-    arm. Arms and heats are springs and dampers, so that poles and zeros stay real and negative for any shares. At a
-    wall ratio other than the usual one the two signs differ in size.
+    An arm of negative stiffness would make the reading fall, too, but such a network may oscillate or grow without
+    bound beside another arm. Arms and heats are springs and dampers: their poles and zeros stay real and negative for
+    any share. At a wall ratio other than the usual one the two signs differ in size.
     """
     return Arm(share, rate_per_s) if share >= 0.0 else Heat(-GAS_SHARE * share, rate_per_s)

@@ -1,4 +1,8 @@
-"""The standard linear solid with effects: the whole measurement chain, simulated forward."""
+"""`ExtendedModel`: the standard linear solid with effects, the whole measurement chain simulated forward.
+
+The model also gives the derivatives of its reading. Each is a difference between two runs of the chain, of which the
+second begins at the first block that the parameter moves.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +31,9 @@ DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """An effect in a model, with the values of its parameters.
+    """An effect in a model, with the ``values`` of its parameters in their order.
 
-    ``until_s``: seconds since a session began from which on it stays as it is by then, where it goes with the clock.
+    ``until_s``: seconds since a session began after which a part that goes with the clock stays as it is by then.
     """
 
     effect: Effect
@@ -43,33 +47,34 @@ class Part:
 
     @property
     def valued(self) -> list[tuple[EffectParameter, float]]:
-        """Each parameter with its value."""
+        """Each parameter of the effect with its value."""
         return [(one, float(value)) for one, value in zip(self.effect.parameters, self.values, strict=True)]
 
     @property
     def kind_ends_at(self) -> tuple[tuple[EffectParameter, float], ...]:
-        """The parameters whose values lie where it turns into an effect of another kind."""
+        """The parameters, with their values, that lie where the effect turns into one of another kind."""
         return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
 
     @property
     def bends_too_little(self) -> bool:
-        """Whether it is a curve's law whose strength lies at the end of its range: the unit may bend farther.
+        """Whether it is a law of a curve, with a strength at the end of its range: the unit may bend farther than that.
 
-        Not where its kind ends, beyond which it is any curve.
+        Not where the effect's kind ends there, beyond which it may be any curve.
         """
-        ends = (one.is_stretched(value) for one, value in self.valued if one.null is not None and value != one.null)
+        at_ends = (one.is_stretched(value) for one, value in self.valued if one.null is not None and value != one.null)
         is_law = self.effect.is_memoryless and not (self.effect.is_flexible or self.kind_ends_at)
-        return is_law and any(ends)
+        return is_law and any(at_ends)
 
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:
     """The standard linear solid (Chinimilli 2016, equation 2) with effects, ``parts``, at their places of the chain.
 
-    ``gain`` is the reading of a held full-scale load as a share of ``full_scale_reading`` (in ``reading_unit``);
-    ``relaxing_share`` kappa and ``relaxation_rate_per_s`` a give p/f = (s + a)/((1 + kappa) s + a). ``wall_ratio`` is
-    N of `smartshoe.models.core`, which matters for leaks and heat only. ``noise`` is the rms, a share of
-    ``full_scale_reading``, of what readings hold besides: its inverse remembers no reversal that may be of it.
+    ``gain`` is the reading of a held full-scale load, as a share of ``full_scale_reading`` (in ``reading_unit``).
+    ``relaxing_share`` kappa and ``relaxation_rate_per_s`` a give p/f = (s + a)/((1 + kappa) s + a). ``wall_ratio`` is N
+    of `smartshoe.models.core` and matters for leaks and heat only. ``noise`` is the rms of the noise in the readings,
+    as a share of ``full_scale_reading``: the model's inverse takes no swing within that noise for a reversal of the
+    load.
     """
 
     gain: float
@@ -85,18 +90,18 @@ class ExtendedModel:
     # -- parameters as one vector ------------------------------------------------------------------------------
     @cached_property
     def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
-        """(effect's name or "baseline", parameter) in the order of `theta`."""
+        """(name of the effect or "baseline", parameter) in the order of `theta`."""
         own = [("baseline", parameter) for parameter in BASELINE]
         return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
 
     @property
     def pole_per_s(self) -> float:
-        """a/(1 + kappa): the rate at which what an earlier load left in the relaxing arm fades from the reading."""
+        """a/(1 + kappa) in 1/s: the rate at which an earlier load in the relaxing arm fades from the reading."""
         return self.relaxation_rate_per_s / (1.0 + self.relaxing_share)
 
     @property
     def theta(self) -> Array:
-        """Every parameter's value (p,)."""
+        """The values (p,) of all parameters, the baseline's first."""
         baseline = [self.gain, self.relaxing_share, self.relaxation_rate_per_s]
         return np.concatenate([baseline, *(part.values for part in self.parts)])
 
@@ -111,22 +116,22 @@ class ExtendedModel:
         return replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
 
     def with_part(self, added: Effect | str, values: ArrayLike | None = None) -> ExtendedModel:
-        """This model with one more effect, itself or its name, at null where ``values`` are not given."""
+        """This model with one more effect, given by itself or its name; its strengths are null without ``values``."""
         added = effect(added) if isinstance(added, str) else added
         part = Part(added, added.start() if values is None else np.array(values, dtype=float))
         return replace(self, parts=(*self.parts, part))
 
     def part(self, name: str) -> Part:
-        """The effect ``name`` in it; KeyError where it is not."""
+        """The part of the effect ``name``; raises `KeyError` where the model has none."""
         return {part.name: part for part in self.parts}[name]
 
     def without(self, *names: str) -> ExtendedModel:
         """This model without the named effects; itself where it has none of them."""
-        kept = tuple(part for part in self.parts if part.name not in names)
-        return replace(self, parts=kept) if len(kept) < len(self.parts) else self
+        remaining = tuple(part for part in self.parts if part.name not in names)
+        return replace(self, parts=remaining) if len(remaining) < len(self.parts) else self
 
     def held_after(self, last_s: float, but: Collection[str]) -> ExtendedModel:
-        """This model with its drifts, ``but`` for these, as they are ``last_s`` into a session from then on.
+        """This model with its drifts held from ``last_s`` seconds into a session on, all ``but`` those named.
 
         Itself where there are none to hold.
         """
@@ -135,7 +140,7 @@ class ExtendedModel:
         return replace(self, parts=tuple(parts)) if held else self
 
     def held_as(self, other: ExtendedModel) -> ExtendedModel:
-        """This model with the drifts that it shares with another held when they are there."""
+        """This model with each drift that it shares with an ``other`` held from when the other's is."""
         until_s = {part.name: part.until_s for part in other.parts}
         return replace(
             self, parts=tuple(replace(part, until_s=until_s.get(part.name, part.until_s)) for part in self.parts)
@@ -143,13 +148,13 @@ class ExtendedModel:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The effects in it."""
+        """The names of the effects in it."""
         return tuple(part.name for part in self.parts)
 
     # -- the chain -----------------------------------------------------------------------------------------------
     @cached_property
     def core(self) -> Core:
-        """The linear network of wall and gas."""
+        """The linear network of wall and gas: the baseline's relaxing arm and the elements of its core effects."""
         elements: list[Element] = [Arm(self.relaxing_share, self.relaxation_rate_per_s)]
         for part in self.parts:
             if isinstance(part.effect, CoreEffect):
@@ -158,7 +163,7 @@ class ExtendedModel:
 
     @cached_property
     def chain(self) -> tuple[Part | None, ...]:
-        """The blocks in the order in which the signal passes them; None stands for the core."""
+        """The parts outside the core in the order in which the signal passes them; None stands for the core."""
         outside = [part for part in self.parts if not isinstance(part.effect, CoreEffect)]
         core = PLACES.index("core")
         before = [part for part in outside if PLACES.index(part.effect.place) < core]
@@ -177,20 +182,26 @@ class ExtendedModel:
         inputs: list[Array] | None = None,
         core: Core | None = None,
     ) -> Array:
-        """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
+        """The reading (n,), a share of full scale, from the ``signal`` (n,) that enters block ``first`` of the chain.
+
+        ``inputs``: takes what enters each block. ``core``: an equal core of another model, which has its modes already.
+        """
         for part in self.chain[first:]:
             if inputs is not None:
                 inputs.append(signal)
             if part is None:
                 signal = _through(core or self.core, signal, conditions)
             else:
-                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
-                signal = part.effect.apply(signal, given.until(part.until_s), part.values)
+                seen = self._around(conditions) if part.effect.bends_beside_arm else conditions
+                signal = part.effect.apply(signal, seen.until(part.until_s), part.values)
                 refuse_other_size(part.name, signal, conditions.load.size)
         return self.gain * signal
 
     def _around(self, conditions: Conditions) -> Conditions:
-        """``conditions`` with the relaxing arm: blocks that bend a spring beside it solve the balance of both."""
+        """``conditions`` with the model's relaxing arm, for blocks that bend a spring beside it.
+
+        Such a block solves the balance of spring and arm together.
+        """
         relaxing = self.relaxing_share, self.relaxation_rate_per_s
         return conditions if conditions.relaxing == relaxing else conditions.within(*relaxing)
 
@@ -204,11 +215,11 @@ class ExtendedModel:
 
     @cached_property
     def _varied(self) -> Extensions:
-        """For each parameter but the gain."""
-        theta, made = self.theta, []
+        """For each parameter but the gain, this model with that parameter moved by a small step."""
+        theta, extensions = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
         core = self.chain.index(None)
-        # What the arm is felt by first: a block that bends beside it, or the core.
+        # The first block that the arm changes: one that bends beside the arm, or the core.
         arm = next(k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm)
         for j, (owner, parameter) in enumerate(self.parameters):
             if j == 0:
@@ -218,17 +229,17 @@ class ExtendedModel:
             moved[j] += step
             first = arm if owner == "baseline" else place_of.get(owner, core)
             trial = self.at(moved)
-            alike = first != core and owner != "baseline"  # this parameter does not touch the core
-            made.append(Extension(step, trial, first, self.core if alike else None))
-        return tuple(made)
+            is_same_core = first != core and owner != "baseline"
+            extensions.append(Extension(step, trial, first, self.core if is_same_core else None))
+        return tuple(extensions)
 
     def sensitivities(
         self, conditions: Conditions, trace: Trace | None = None, out: Array | None = None
     ) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
-        The chain is run anew only from the first block that a parameter moves.
-        ``trace``: this model's own under the same conditions, where it is known; ``out`` takes the derivatives.
+        ``trace``: this model's own `trace` under the same conditions, where it is known. ``out`` (n, p) takes the
+        derivatives.
         """
         trace = trace or self.trace(conditions)
         out = np.empty((trace[0].size, 1 + len(self._varied)), order="F") if out is None else out
@@ -237,19 +248,22 @@ class ExtendedModel:
         return trace[0], out
 
     def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
-        """Of these derivatives those (n, k) with respect to the parameters of the effect ``name``."""
+        """Derivatives (n, k) of the reading with respect to the parameters of the effect ``name``."""
         own = [by for by, (owner, _) in zip(self._varied, self.parameters[1:], strict=True) if owner == name]
         return self.column_of(own, conditions, trace)
 
     def trace(self, conditions: Conditions) -> Trace:
-        """The reading (n,), and what goes into each block of the chain, the chain's end last."""
+        """The reading (n,), and the signals (n,) that enter each block of the chain, with that at its end last."""
         inputs: list[Array] = []
         reading = self._run(conditions.load, conditions, 0, inputs)
         return reading, [*inputs, reading / self.gain]
 
     def extended_by(self, added: Effect, start: Array) -> Extensions:
-        """A small step of each strength of an effect that is not in it yet; ``start``: null strengths and a shape."""
-        made = []
+        """This model with an effect ``added`` at a small strength: one extension for each strength of the effect.
+
+        ``start``: the effect's null strengths and the values of its shape parameters.
+        """
+        extensions = []
         for j, parameter in enumerate(added.parameters):
             if parameter.null is None:
                 continue
@@ -259,13 +273,13 @@ class ExtendedModel:
             trial, in_core = self.with_part(added, moved), isinstance(added, CoreEffect)
             names = [None if part is None else part.name for part in trial.chain]
             first = names.index(None if in_core else added.name)
-            made.append(Extension(step, trial, first, None if in_core else self.core))
-        return tuple(made)
+            extensions.append(Extension(step, trial, first, None if in_core else self.core))
+        return tuple(extensions)
 
     def column_of(
         self, by: Sequence[Extension], conditions: Conditions, trace: Trace, out: Array | None = None
     ) -> Array:
-        """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
+        """Derivatives (n, k) of the reading by what the extensions ``by`` (k) move; ``trace``: this model's own."""
         reading, inputs = trace
         out = np.empty((reading.size, len(by)), order="F") if out is None else out
         for column, one in enumerate(by):
@@ -291,7 +305,10 @@ class ExtendedModel:
 
     @classmethod
     def from_dict(cls, given: Mapping[str, Any]) -> ExtendedModel:
-        """The model that `to_dict` described; raises `UsageError` for an effect that is not known, `KeyError`."""
+        """The model that `to_dict` described.
+
+        Raises `UsageError` for an effect that is not known, and `KeyError` where a value is missing.
+        """
         held = given.get("held_after_s", {})
         plain = {key: given[key] for key in given if key not in ("effects", "held_after_s")}
         parts = []
@@ -302,9 +319,9 @@ class ExtendedModel:
 
 
 def _through(core: Core, signal: Array, conditions: Conditions) -> Array:
-    """What comes out of a core (n,) for a ``signal`` (n,) after the load that went before the recording.
+    """The output (n,) of a ``core`` for a ``signal`` (n,), with the load that went before the recording.
 
-    That load as it was measured: what blocks before the core would make of it is small in a memory.
+    That load is taken as it was measured: what blocks before the core would change of it is small in the core's memory.
     """
     earlier = conditions.earlier
     if not earlier.size:
@@ -313,12 +330,12 @@ def _through(core: Core, signal: Array, conditions: Conditions) -> Array:
 
 
 def _stored(parameter: EffectParameter, values: Mapping[str, float]) -> float:
-    """A parameter's value in a file, also in one from before the parameter was known."""
+    """The value of a ``parameter`` in a file; its ``absent`` value where the file is older than the parameter."""
     return values[parameter.name] if parameter.absent is None else values.get(parameter.name, parameter.absent)
 
 
 def derivative_step(parameter: EffectParameter, value: float) -> float:
-    """A small step that stays within the parameter's bounds."""
+    """A step of a parameter at ``value`` for a derivative, small and within the bounds."""
     if parameter.null is None:
         step = DERIVATIVE_STEP * abs(value) or DERIVATIVE_STEP * parameter.size
     else:
@@ -328,7 +345,11 @@ def derivative_step(parameter: EffectParameter, value: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """A model with one parameter moved by ``step``: the ``first`` block that it moves, the ``core`` where it stays."""
+    """A ``model`` that differs from another in one parameter, moved by ``step``.
+
+    ``first``: the first block of the chain that differs. ``core``: the other model's core, where it is the same; else
+    None.
+    """
 
     step: float
     model: ExtendedModel
@@ -336,7 +357,10 @@ class Extension:
     core: Core | None
 
     def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions, out: Array) -> None:
-        """The reading's derivative, into ``out`` (n,); ``inputs``: what goes into each block of what did not move."""
+        """Writes the derivative of the reading with respect to the parameter into ``out`` (n,).
+
+        ``reading`` (n,) and ``inputs`` are the `trace` of the model without the step.
+        """
         moved = self.model._run(inputs[self.first], conditions, self.first, core=self.core)
         np.subtract(moved, reading, out=out)
         out /= self.step

@@ -1,7 +1,7 @@
-"""Inverses of springs that bend inside the loop of wall and gas: what the relaxing arm bears is set apart first.
+"""Inverses of springs that bend beside the relaxing arm: the load that the arm bears is taken off first.
 
-The blocks solve f = phi(u) + kappa (u - q), q' = a (u - q) with u the deformation (`smartshoe.models.effects`). Given
-u, the load follows without a loop.
+The blocks solve f = phi(u) + kappa (u - q), q' = a (u - q), with u the deformation (`smartshoe.models.effects`). Given
+u, the load follows directly.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from smartshoe.models.first_order import hold_coefficients
 
 
 class _Lag:
-    """w = alpha/(s + alpha) u on a stream of straight lines, started in steady state."""
+    """w = alpha/(s + alpha) u on a stream of straight lines, started in the steady state of its first value."""
 
     def __init__(self, alpha: float, step_s: float) -> None:
         self.decay, self.now, self.before = (float(value) for value in hold_coefficients(alpha * step_s))
@@ -37,7 +37,7 @@ class _Lag:
         return np.asarray(w)
 
     def c_lines(self, state: str, begun: str, into: str, given: str) -> str:
-        """C that declares ``into``, the lag of the double ``given``; ``state`` and ``begun`` are members."""
+        """C that declares ``into``, the lag of the double ``given``; ``state`` and ``begun`` are of the struct."""
         return f"""    if (!({begun} > 0.0)) {{
         {state} = {given} - {self.now!r} * {given};
     }}
@@ -46,7 +46,7 @@ class _Lag:
 """
 
     def c_increments(self, state: str, begun: str, into: str, given: str) -> str:
-        """The same for single precision; ``state`` is the lag itself, ``state``_before what was given before."""
+        """`c_lines` for single precision: ``state`` is the lag itself, ``state``_before the last ``given``."""
         return f"""    if (!({begun} > 0.0)) {{
         {state} = {given};
         {state}_before = {given};
@@ -61,9 +61,10 @@ class _Lag:
 
 
 class BesideArm(Inverse):
-    """A block of the wall: the core is given u + kappa (u - q), of which kappa (u - q) is the arm's.
+    """The inverse of a block of the wall beside the relaxing ``arm`` (share kappa, rate a).
 
-    ``spring`` turns u into phi(u); ``arm`` is the baseline's, of share kappa and rate a.
+    The core is given u + kappa (u - q), of which the arm bears kappa (u - q); ``spring`` turns the rest, u, into
+    phi(u).
     """
 
     def __init__(self, spring: Inverse, arm: Arm, step_s: float) -> None:
@@ -77,16 +78,16 @@ class BesideArm(Inverse):
         self.lag.reset()
 
     def push(self, signal: Array, time_s: Array) -> Array:
-        """Load (n,) on spring and arm together."""
+        """Load (n,) on spring and arm together, from what the core is given, ``signal`` (n,)."""
         arm = self.part * (signal - self.lag.push(signal))
         return np.asarray(self.spring.push(signal - arm, time_s) + arm)
 
     def c_step(self, name: str) -> CStep:
-        """The same, around the spring's own."""
+        """The spring's C step, with the arm's load taken off before it and put back after it."""
         return self._around(name, self.spring.c_step(name), self.lag.c_lines)
 
     def c_single(self, name: str) -> CStep:
-        """The same by increments."""
+        """`c_step` with the lag by increments, for single precision."""
         return self._around(name, self.spring.c_single(name), self.lag.c_increments)
 
     def _around(self, name: str, step: CStep, lag: Callable[[str, str, str, str], str]) -> CStep:
@@ -103,9 +104,9 @@ class BesideArm(Inverse):
 
 
 class GasBesideArm(Inverse):
-    """The gas's own block: pressure in, out comes what the linear core would have given.
+    """The inverse of a block of the gas: from the pressure, the pressure that the linear core would have given.
 
-    ``spring`` turns the pressure into the load on wall spring and gas, whose deformation is (1 + g) p/(1 + g p) with
+    ``spring`` turns the pressure into the load on wall spring and gas, whose deformation is (1 + g) p/(1 + g p), with
     ``ratio`` g.
     """
 
@@ -129,11 +130,11 @@ class GasBesideArm(Inverse):
         return np.asarray(load - self.part * (load - self.core.push(load)))
 
     def c_step(self, name: str) -> CStep:
-        """The same, around the spring's own."""
+        """The spring's C step, with the arm's load added after it and the linear core's relaxation taken off."""
         return self._around(name, self.spring.c_step(name), _Lag.c_lines)
 
     def c_single(self, name: str) -> CStep:
-        """The same by increments."""
+        """`c_step` with the lags by increments, for single precision."""
         return self._around(name, self.spring.c_single(name), _Lag.c_increments)
 
     def _around(self, name: str, step: CStep, lag: Callable[[_Lag, str, str, str, str], str]) -> CStep:
@@ -149,5 +150,5 @@ class GasBesideArm(Inverse):
 
 
 def _members(body: str, lag: str) -> dict[str, float]:
-    """The members of the struct that a lag's C has."""
+    """The members of the struct that the C of a ``lag`` uses, with their initial values."""
     return {name: 0.0 for name in (lag, f"{lag}_before") if f"f->{name}" in body}

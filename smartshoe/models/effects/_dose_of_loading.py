@@ -1,8 +1,8 @@
-"""How much a unit has borne, by loadings and by time: what flexible blocks of sets and of softening grow with.
+"""The dose that a unit has borne, by loadings and by time: flexible blocks of set and of softening grow with it.
 
 X = c S + (1 - c) D / 10 s: S is the sum of loadings, z^m from trough to peak, D the integral of p^m over time. z is p
-through a play, since the noise of a load would be loadings without end. Both begin anew in each session, and what
-grows with them does so ever more slowly: X0 log(1 + X/X0).
+through a play, since the noise of a load would else count as loadings without end. Both begin at 0 in each session.
+What grows with the dose does so ever more slowly: X0 log(1 + X/X0).
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import NO_LOAD, SETTLED, Undone, cleaned, dead_zone
 from smartshoe.models.effects.effect import Conditions, EffectParameter
 
-HALF_WIDTH = 0.01  # of full scale: a loading is more than twice of it, so that noise is none
+HALF_WIDTH = 0.01  # of full scale: a loading is more than twice of it, so that noise does not count
 MOST_ROUNDS = 80  # 0.6, of the largest set that grows with the fourth power of a loading, to this power is 2e-18
 USUAL_STROKE_S = 10.0  # seconds under full-scale load that count as one loading to it
 
 
 def shape_parameters(most_early: float) -> tuple[EffectParameter, ...]:
-    """Of ``by_stroke`` c, ``exponent`` m and ``early`` X0."""
+    """The parameters ``by_stroke`` c, ``exponent`` m and ``early`` X0, the last up to ``most_early``."""
     return (
         EffectParameter("by_stroke", "1", "share of it that goes by loadings, not by time", None, 0.0, 1.0, 0.5),
         EffectParameter("exponent", "1", "power of the load that it grows with", None, 0.7, 4.0, 1.0),
@@ -34,7 +34,7 @@ def shape_parameters(most_early: float) -> tuple[EffectParameter, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Dose:
-    """What grows by ``size`` with the first loading to full scale."""
+    """What grows with the dose, by about ``size`` with the first loading to full scale."""
 
     size: float
     by_stroke: float
@@ -51,7 +51,10 @@ class Dose:
         return self.size * self.early * np.log1p(dose / self.early)
 
     def undone(self, step_s: float, is_gain: bool) -> Undone:
-        """What was added is subtracted, or a gain divided by; exact, the dose being of what comes out."""
+        """The inverse: what was added is subtracted, or (``is_gain``) a gain is divided by.
+
+        Exact, since the dose is of the block's input, which the inverse gives out.
+        """
         from smartshoe.kernels.dose import dose_undone
 
         held = 0.5 * step_s * (1.0 - self.by_stroke) / USUAL_STROKE_S

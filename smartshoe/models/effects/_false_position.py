@@ -4,10 +4,10 @@ from __future__ import annotations
 
 
 def closer_in_c(at: str) -> str:
-    """C that moves ``at`` closer to where a rising ``left`` is zero, in a loop that counts its steps by ``k``.
+    """C that moves ``at`` closer to where a rising function ``left`` is zero, in a loop that counts its steps by ``k``.
 
-    Beside these it takes ``low``, ``high``, ``under``, ``over`` and ``stays``, which begins as 0. Step 0 has what is
-    left at ``low``, step 1 at ``high``; a loop that knows the former begins with step 1.
+    It uses the variables ``low``, ``high``, ``under``, ``over`` and ``stays``, which begins as 0. Step 0 has the
+    function's value at ``low``, step 1 that at ``high``; a loop that knows the former begins with step 1.
     """
     return f"""if (k == 0) {{
             under = left;

@@ -1,4 +1,4 @@
-"""A curve that rises everywhere and is free otherwise: its slope is straight between knots, and never zero."""
+"""A curve that rises everywhere and is otherwise free: its slope is linear between knots, and never zero."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KNOTS = np.linspace(0.0, 1.0, 6) ** 1.5  # shares of full scale; denser at low l
 
 
 def slope_weights(quantity: str) -> tuple[EffectParameter, ...]:
-    """One parameter a knot: how much steeper the curve is about it, ``quantity`` naming what runs along the curve."""
+    """One parameter a knot: how much steeper the curve is there; ``quantity`` names what runs along the curve."""
     return tuple(
         EffectParameter(
             f"slope_{k}", "1", f"relative departure of the slope at {100.0 * knot:.0f} % of full-scale {quantity}",
@@ -39,7 +39,7 @@ def bent(signal: Array, weights: Array) -> Array:
 
 
 def straightened(weights: Array) -> Inverse:
-    """The inverse of `bent`: the parabola of the piece solved for its argument, exact to rounding."""
+    """The inverse of `bent`: the parabola between two knots is solved for its argument, exact to rounding."""
     start, slope, bend = _pieces(weights)
     return Memoryless(partial(_undo, weights=weights), _c_body(start, slope, bend))
 
@@ -56,6 +56,7 @@ def _pieces(weights: Array) -> tuple[Array, Array, Array]:
 
 
 def _undo(signal: Array, time_s: Array, weights: Array) -> Array:
+    """(n,) arguments at which the curve has the values ``signal`` (n,), whatever the time."""
     start, slope, bend = _pieces(weights)
     y = np.clip(signal, 0.0, 1.0)
     at = np.searchsorted(start[1:-1], y, side="right")
@@ -68,6 +69,8 @@ def _undo(signal: Array, time_s: Array, weights: Array) -> Array:
 
 
 def _c_body(start: Array, slope: Array, bend: Array) -> str:
+    """`_undo` in C, by the curve's value, slope and bend at the knots."""
+
     def row(values: Array) -> str:
         return ", ".join(c_number(value) for value in values)
 

@@ -1,6 +1,6 @@
-"""What is asked of an effect of another package when it is offered, so that its faults are told as such, and at once.
+"""The checks of an effect that another package offers: a faulty one is refused at once, with the package's name.
 
-It costs some runs of the effect at each start where such a package is installed; ours are held to the same by tests.
+They run such an effect a few times at each start. The effects of this package are held to the same by tests.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from smartshoe.models.effects.effect import (
 from smartshoe.models.effects.exposure import CHANNELS, WORDS
 from smartshoe.models.elements import Arm
 
-SAID = ("name", "family", "stage", "place", "says", "parameters")
-SHORT, LONG = (32, 0.02), (3000, 0.01)  # samples, and the step between them in s, of what an effect is tried on
+REQUIRED = ("name", "family", "stage", "place", "says", "parameters")
+SHORT, LONG = (32, 0.02), (3000, 0.01)  # samples of a trial signal, and the step between them in s
 RELAXING = (0.06, 0.2)
-IDENTITY = 1e-9  # of full scale: from its input, an effect at its null, or an inverse on a cut stream, differs less
+IDENTITY = 1e-9  # of full scale: an effect at null differs less from its input, an inverse less on a cut stream
 
 
-def refuse_faulty(made: Effect, origin: str) -> None:
-    """Raises `UsageError` with the first thing that is wrong with an effect, which ``origin`` says who offers."""
+def refuse_faulty(offered: Effect, origin: str) -> None:
+    """Raises `UsageError` with the first fault of an ``offered`` effect; ``origin`` names who offers it."""
     at = ""
     try:
-        wrong = next(_wrongs(made), "")
+        wrong = next(_wrongs(offered), "")
         if wrong:
             raise UsageError(f"{origin} {wrong}: mend the package")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what comes of a warning is judged by the numbers
-            for shape in made.shapes:
+            for shape in offered.shapes:
                 at = "".join(f" at {name} = {value:g}" for name, value in shape.items())
-                _try(made, shape)
+                _try(offered, shape)
     except UsageError:
         raise
     except (Exception, SystemExit) as error:  # whatever another package does
@@ -54,50 +54,53 @@ def refuse_faulty(made: Effect, origin: str) -> None:
         ) from error
 
 
-def _wrongs(made: Effect) -> Iterator[str]:
-    """What is wrong with what it says of itself, each as the end of a sentence."""
-    missing = [word for word in SAID if not hasattr(made, word)]
+def _wrongs(offered: Effect) -> Iterator[str]:
+    """The faults of what the effect declares, each as the end of a sentence."""
+    missing = [word for word in REQUIRED if not hasattr(offered, word)]
     if missing:
         yield f"has no {', no '.join(missing)}"
-    yield from _wrong_kinds(made)
-    yield from _wrong_words(made)
-    if not isinstance(made.parameters, tuple) or not all(isinstance(p, EffectParameter) for p in made.parameters):
-        yield f"has the parameters {made.parameters!r}, which are no tuple of EffectParameter"
-    for parameter in made.parameters:
+    yield from _wrong_kinds(offered)
+    yield from _wrong_words(offered)
+    if not isinstance(offered.parameters, tuple) or not all(isinstance(p, EffectParameter) for p in offered.parameters):
+        yield f"has the parameters {offered.parameters!r}, which are no tuple of EffectParameter"
+    for parameter in offered.parameters:
         yield from (f"has a parameter {parameter.name!r} {wrong}" for wrong in _wrong_numbers(parameter))
-    names = [parameter.name for parameter in made.parameters]
+    names = [parameter.name for parameter in offered.parameters]
     yield from (f"has two parameters of the name {name!r}" for name in names if names.count(name) > 1)
-    if made.is_physical and all(parameter.null is None for parameter in made.parameters):
+    if offered.is_physical and all(parameter.null is None for parameter in offered.parameters):
         yield "has no parameter with a null value, and so no strength that could be fitted"
-    yield from _wrong_shapes(made)
+    yield from _wrong_shapes(offered)
 
 
-def _wrong_kinds(made: Effect) -> Iterator[str]:
+def _wrong_kinds(offered: Effect) -> Iterator[str]:
+    """Faults of its class, its name, its place and its traits."""
     for word in ("name", "family", "stage", "says"):
-        value = getattr(made, word)
+        value = getattr(offered, word)
         if not isinstance(value, str) or not value or not value.isprintable():
             yield f"has the {word} {value!r}, which is no text"
-    if not _is_identifier(made.name):
-        yield f"has the name {made.name!r}, which is no word of letters, digits and underscores"
-    if made.place not in PLACES:
-        yield f"has the place {made.place!r}, which is none of {', '.join(PLACES)}"
-    if (made.place == "core") != isinstance(made, CoreEffect):
-        yield f"is a {type(made).__name__} at the place {made.place!r}, but CoreEffects, and no others, are at 'core'"
+    if not _is_identifier(offered.name):
+        yield f"has the name {offered.name!r}, which is no word of letters, digits and underscores"
+    if offered.place not in PLACES:
+        yield f"has the place {offered.place!r}, which is none of {', '.join(PLACES)}"
+    if (offered.place == "core") != isinstance(offered, CoreEffect):
+        place = f"is a {type(offered).__name__} at the place {offered.place!r}"
+        yield f"{place}, but CoreEffects, and no others, are at 'core'"
     for word, usual in vars(Effect).items():
         if isinstance(usual, bool | str) and not word.startswith("_"):
-            value = getattr(made, word)
+            value = getattr(offered, word)
             if not isinstance(value, type(usual)):
                 yield f"has {word} = {value!r}, which is no {type(usual).__name__}"
     for word in ("shifts", "between_clocks"):
-        if getattr(made, word) is not None:
-            yield f"has {word} = {getattr(made, word)!r}, which effects of smartshoe alone may say"
+        if getattr(offered, word) is not None:
+            yield f"has {word} = {getattr(offered, word)!r}, which effects of smartshoe alone may say"
 
 
-def _wrong_words(made: Effect) -> Iterator[str]:
-    if not isinstance(made.separated_by, Mapping):
-        yield f"has separated_by = {made.separated_by!r}, which is no mapping of an effect's name to words"
-    asked = {"exposed_by": made.exposed_by, "needs": made.needs}
-    asked |= {f"separated_by[{name!r}]": words for name, words in made.separated_by.items()}
+def _wrong_words(offered: Effect) -> Iterator[str]:
+    """Faults of the words for what shows it and what tells it from others."""
+    if not isinstance(offered.separated_by, Mapping):
+        yield f"has separated_by = {offered.separated_by!r}, which is no mapping of an effect's name to words"
+    asked = {"exposed_by": offered.exposed_by, "needs": offered.needs}
+    asked |= {f"separated_by[{name!r}]": words for name, words in offered.separated_by.items()}
     for where, words in asked.items():
         if not isinstance(words, frozenset | set):
             yield f"has {where} = {words!r}, which is no set of words as by(...) gives"
@@ -108,6 +111,7 @@ def _wrong_words(made: Effect) -> Iterator[str]:
 
 
 def _wrong_numbers(one: EffectParameter) -> Iterator[str]:
+    """Faults of one parameter."""
     if not _is_identifier(one.name):
         yield "whose name is no word of letters, digits and underscores"
     if not (isinstance(one.unit, str) and isinstance(one.says, str)):
@@ -124,17 +128,20 @@ def _wrong_numbers(one: EffectParameter) -> Iterator[str]:
         yield f"of the channel {one.channel!r}, which is none of {', '.join(sorted(CHANNELS))}"
 
 
-def _wrong_shapes(made: Effect) -> Iterator[str]:
-    if not (isinstance(made.shapes, tuple) and made.shapes and all(isinstance(s, Mapping) for s in made.shapes)):
-        yield f"has shapes = {made.shapes!r}, no tuple of one mapping or more, and so would never be tried"
-    free = {parameter.name: parameter for parameter in made.parameters if parameter.null is None}
-    for shape in made.shapes:
+def _wrong_shapes(offered: Effect) -> Iterator[str]:
+    """Faults of the grid over its shape parameters."""
+    if not (
+        isinstance(offered.shapes, tuple) and offered.shapes and all(isinstance(s, Mapping) for s in offered.shapes)
+    ):
+        yield f"has shapes = {offered.shapes!r}, no tuple of one mapping or more, and so would never be tried"
+    free = {parameter.name: parameter for parameter in offered.parameters if parameter.null is None}
+    for shape in offered.shapes:
         for name, value in shape.items():
             if name not in free:
                 yield f"has a shape of {name!r}, which is no parameter of it without a null value"
             if not (_is_number(value) and free[name].lower <= value <= free[name].upper):
                 yield f"has a shape of {name} = {value!r}, which is not within its bounds"
-        missing = free.keys() - made.shapes[0].keys() - shape.keys()
+        missing = free.keys() - offered.shapes[0].keys() - shape.keys()
         if missing:
             yield f"has a shape in which parameter {min(missing)} has no value"
 
@@ -148,47 +155,52 @@ def _is_number(value: Any) -> bool:
 
 
 def _conditions(count: int, step_s: float, *, logged: bool) -> Conditions:
-    """Triangles of the load, one every few seconds at most, with all that may be logged beside it, or nothing."""
+    """Triangles of the load, of some seconds each, with all channels that may be ``logged``, or none."""
     turns = np.linspace(0.0, max(2.0, count * step_s / 5.0), count)
     load = 1.0 - np.abs(turns % 2.0 - 1.0)
-    load.flags.writeable = False  # what writes to its input spoils that of others
-    beside = (np.linspace(0.0, 3.0, count), 0.5 * load, RELAXING) if logged else (None, None, None)
-    temperature_k, neighbour, relaxing = beside
+    load.flags.writeable = False  # an effect that writes to its input would spoil that of others
+    channels = (np.linspace(0.0, 3.0, count), 0.5 * load, RELAXING) if logged else (None, None, None)
+    temperature_k, neighbour, relaxing = channels
     time_s: Array = step_s * np.arange(count, dtype=float)
     return Conditions(time_s, load, step_s, temperature_k=temperature_k, neighbour=neighbour, relaxing=relaxing)
 
 
-def _try(made: Effect, shape: Mapping[str, float]) -> None:
-    """Run it at one of its shapes; raises what it raises, `TypeError` or `ValueError` for what it gives."""
-    null, begun = made.start(shape), made.begun(shape, logged=CHANNELS)
+def _try(offered: Effect, shape: Mapping[str, float]) -> None:
+    """Runs it at one of its shapes; raises what it raises, or `TypeError` or `ValueError` for a wrong result.
+
+    1. At null strengths it must be the identity; asked twice, it must give the same.
+    2. Its inverse, if any, must not depend on how the stream is cut (`_try_inverse`).
+    3. An effect of noise must give evidence of the right type.
+    """
+    null, begun = offered.start(shape), offered.begun(shape, logged=CHANNELS)
     for at in (_conditions(*SHORT, logged=False), _conditions(*SHORT, logged=True)):
-        still = _checked(made.apply(at.load, at, null), at.load.size, "apply")
-        most = float(np.max(np.abs(still - at.load)))
-        if most > IDENTITY:
-            raise ValueError(f"at its null values apply is not the identity, but {most:.2g} of full scale away")
-        first, again = (_checked(made.apply(at.load, at, begun), at.load.size, "apply") for _ in range(2))
+        at_null = _checked(offered.apply(at.load, at, null), at.load.size, "apply")
+        largest = float(np.max(np.abs(at_null - at.load)))
+        if largest > IDENTITY:
+            raise ValueError(f"at its null values apply is not the identity, but {largest:.2g} of full scale away")
+        first, again = (_checked(offered.apply(at.load, at, begun), at.load.size, "apply") for _ in range(2))
         if not np.array_equal(first, again):
             raise ValueError("apply gives other numbers when it is asked the same again")
     long = _conditions(*LONG, logged=True)
-    output = _checked(made.apply(long.load, long, begun), long.load.size, "apply")
-    if made.is_physical:
-        _try_inverse(made, begun, at, first)
-        _try_inverse(made, begun, long, output)
-    if isinstance(made, NoiseEffect):
+    output = _checked(offered.apply(long.load, long, begun), long.load.size, "apply")
+    if offered.is_physical:
+        _try_inverse(offered, begun, at, first)
+        _try_inverse(offered, begun, long, output)
+    if isinstance(offered, NoiseEffect):
         residual = np.random.default_rng(1).normal(0.0, 1e-3, long.load.size)
-        found = made.evidence(residual, long, long.load)
+        found = offered.evidence(residual, long, long.load)
         if not isinstance(found, SensorEvidence | None):
             raise TypeError(f"evidence gives {found!r}, which is neither a SensorEvidence nor None")
 
 
-def _try_inverse(made: Effect, values: Array, at: Conditions, output: Array) -> None:
-    """Undo what it made of a signal, in one piece and, of a short one, in two."""
-    undone = made.inverse_within(ChainContext(Arm(*RELAXING)), values, at.step_s)
+def _try_inverse(offered: Effect, values: Array, at: Conditions, output: Array) -> None:
+    """Undoes the effect's ``output`` (n,), whole and, if it is short, in two pieces."""
+    undone = offered.inverse_within(ChainContext(Arm(*RELAXING)), values, at.step_s)
     if undone is None:
         return
     if not isinstance(undone, Inverse):
         raise TypeError(f"inverse gives {undone!r}, which is neither an Inverse nor None")
-    if made.is_drift and not isinstance(undone, Memoryless):
+    if offered.is_drift and not isinstance(undone, Memoryless):
         raise TypeError("is_drift needs a Memoryless inverse, which can be held where nothing tells how it goes on")
 
     def pushed(part: slice) -> Array:
@@ -204,9 +216,10 @@ def _try_inverse(made: Effect, values: Array, at: Conditions, output: Array) -> 
 
 
 def _checked(found: Any, size: int, what: str) -> Array:
-    of = np.shape(found)
-    if of != (size,):
-        raise ValueError(f"{what} gives values of shape {of} for a signal of shape ({size},)")
+    """``found`` where it is a finite array (``size``,) of float64; else raises. ``what`` is its name in the message."""
+    shape = np.shape(found)
+    if shape != (size,):
+        raise ValueError(f"{what} gives values of shape {shape} for a signal of shape ({size},)")
     if not isinstance(found, np.ndarray) or found.dtype != np.float64:
         kind = found.dtype if isinstance(found, np.ndarray) else type(found).__name__
         raise TypeError(f"{what} gives {kind}, no array of float64")

@@ -1,4 +1,4 @@
-"""One pole, or two in a row, between samples and undone on a stream."""
+"""First-order lags of a sampled signal, one or two in a row, and their inverse on a stream."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ POWERS = (POINTS - 0.5) ** np.arange(4)[:, None]  # (power, point): of s between
 
 
 def _weights(x: float) -> Array:
-    """(4,) of the samples at `NODES` in w(0) = exp(-x) w(-1) + integral of x exp(x s) u(s) from -1 to 0."""
+    """(4,) weights of the samples at `NODES` in the integral of x exp(x s) u(s) over s from -1 to 0, u a cubic."""
     if x < 2.0:
         moments = np.sum(WEIGHTS * x * np.exp(x * POWERS[1]) * POWERS, axis=1)
     else:
@@ -29,7 +29,7 @@ def _weights(x: float) -> Array:
 
 
 def lagged(u: Array, x: float) -> Array:
-    """w (n,) of w' = (u - w) x, the step being 1, from w = u before the first sample."""
+    """w (n,) of w' = (u - w) x for ``u`` (n,), time in steps, from w = u before the first sample."""
     from smartshoe.kernels.linear_filter import linear_filter
 
     if u.size < 2:
@@ -39,7 +39,7 @@ def lagged(u: Array, x: float) -> Array:
 
 
 def lagged_by_direction(u: Array, rising: float, falling: float) -> Array:
-    """w (n,) of the same where x is ``rising`` while u lies above w, and ``falling`` while it lies below."""
+    """`lagged`, with x = ``rising`` while u lies above w, and x = ``falling`` while it lies below."""
     from smartshoe.kernels import sensing
 
     if u.size < 2:
@@ -49,7 +49,7 @@ def lagged_by_direction(u: Array, rising: float, falling: float) -> Array:
 
 
 def _drive(u: Array, x: float) -> Array:
-    """(n,) what each step adds to exp(-x) of the value before."""
+    """(n,) what each step adds to w, beside exp(-x) times its last value."""
     padded = np.concatenate([[u[0], u[0]], u, [2.0 * u[-1] - u[-2]]])
     drive: Array = np.convolve(padded, _weights(x)[::-1], "valid")
     drive[0] = (1.0 - math.exp(-x)) * u[0]
@@ -57,7 +57,10 @@ def _drive(u: Array, x: float) -> Array:
 
 
 class Lead(Inverse):
-    """Two leads in a row, their times in steps: the first one's while the signal is ``rising`` or ``falling``."""
+    """Two leads in a row, the inverse of two lags; their times are in steps.
+
+    The first one's time is ``rising`` or ``falling``, as the signal rises or falls; the second one's is ``fast``.
+    """
 
     def __init__(self, rising: float, falling: float, fast: float) -> None:
         self.rising, self.falling, self.fast = rising, falling, fast

@@ -1,4 +1,4 @@
-"""A gain that goes by the sense of motion: what the laws and the flexible block of asymmetries share."""
+"""A gain that depends on whether the load rises or falls: shared by the law and the flexible block of asymmetries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from smartshoe.models.effects.effect import Conditions
 
 
 def by_sense(signal: Array, conditions: Conditions, lost: float, turn: float, fade: float) -> Array:
-    """``signal`` (n,) times 1 - ``lost`` (1 - s)/2; the sense s turns over within ``turn`` and fades by ``fade``."""
+    """``signal`` (n,) times 1 - ``lost`` (1 - s)/2, with s the load's sense of motion, 1 rising and -1 falling.
+
+    It turns over within a move of ``turn``, and fades by ``fade`` a step.
+    """
     if lost == 0.0:
         return signal.copy()
     sense = conditions.kept("sense_of_motion", (turn, fade), lambda: _sense(conditions, turn, fade))
@@ -22,6 +25,7 @@ def by_sense(signal: Array, conditions: Conditions, lost: float, turn: float, fa
 
 
 def _sense(conditions: Conditions, turn: float, fade: float) -> Array:
+    """(n,) the sense of motion of the load, computed in a kernel."""
     from smartshoe.kernels.memory import sense_of_motion
 
     load = cleaned_load(conditions)
@@ -31,7 +35,7 @@ def _sense(conditions: Conditions, turn: float, fade: float) -> Array:
 
 
 def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> Undone:
-    """The load whose own sense gives the output, by false position; exact for a load without noise."""
+    """The load whose sense of motion gives the output, by false position; exact for a load without noise."""
     from smartshoe.kernels.memory import SOLVED, STEPS, sense_undone
 
     def body(of: Mapping[str, str]) -> str:
@@ -81,5 +85,5 @@ def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> 
 
 
 def _start(fade: float) -> Array:
-    """No load yet, and that of loading; none where it has faded at rest."""
+    """The kernel's state at first: no load yet, and the sense of loading, or none where it fades at rest."""
     return np.array([NO_LOAD, 0.0 if fade > 0.0 else 1.0])

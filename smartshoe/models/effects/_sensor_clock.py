@@ -1,4 +1,4 @@
-"""What drifts by: the clock, and the temperature where it was logged."""
+"""What zeros and gains drift with: the time since the session began, and the temperature where it was logged."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from smartshoe.models.effects.effect import LEAST_CHANGE_K, Conditions, EffectPa
 from smartshoe.models.first_order import lag
 
 SAME_AS_TIME = 0.98  # correlation above which a temperature is a clock, and the two have no separate coefficients
-SMOOTHED_S = 3.0  # a thermometer's noise would come in as noise of the model; no faster body is told from this one
+SMOOTHED_S = 3.0  # over which a thermometer's noise is averaged; a body that is faster looks the same
 BLOCKS = 50
 TEMPERATURE_LAG = EffectParameter(
     "temperature_lag",
@@ -32,27 +32,29 @@ EXPONENT = EffectParameter("exponent", "1", "power of the time, 1 for a steady d
 
 
 def running_time_s(conditions: Conditions) -> Array:
-    """(n,) seconds since the unit rested and was zeroed, through the recordings that this one continues."""
+    """(n,) seconds since the unit rested and was zeroed, also where this recording continues others."""
     return conditions.kept("running_time_s", (), lambda: conditions.time_s + conditions.before.get("time_s", 0.0))
 
 
 def grown(time_s: Array, exponent: float) -> Array:
-    """(n,) the time that a steady drift would take to come as far."""
+    """(n,) the time in which a steady drift would come as far as one with this ``exponent`` does in ``time_s`` (n,)."""
     return time_s if exponent == 1.0 else np.asarray(FIRST_S * (time_s / FIRST_S) ** exponent)
 
 
 def grown_in_c(exponent: float) -> str:
-    """A C expression of ``t`` in s: `grown`. A steady drift costs firmware no power."""
+    """`grown` as a C expression of ``t`` in s; for a steady drift without a power, which firmware would pay for."""
     return "t" if exponent == 1.0 else f"{c_number(FIRST_S)} * pow(t / {c_number(FIRST_S)}, {c_number(exponent)})"
 
 
 def drift(conditions: Conditions, values: Array, exponent: float, carried_over: float = 0.0) -> Array:
-    """(n,) a rate ``values[0]`` in 1/s times the time and a coefficient ``values[1]`` in 1/K times the temperature.
+    """(n,) a rate ``values[0]`` in 1/s times the time, and a coefficient ``values[1]`` in 1/K times the temperature.
 
-    The time is `grown` by ``exponent``. The sensor's body follows the temperature that was logged by a first-order lag
-    of ``values[2]`` s, and is as warm as that where the recording begins. The coefficient does nothing without a
-    temperature that moves, the rate nothing where that temperature rises as evenly as a clock. ``carried_over`` is the
-    share that counts of what the recording begins warmer than the first of all.
+    1. The time is `grown` by ``exponent``.
+    2. The sensor's body follows the logged temperature by a first-order lag of ``values[2]`` s, and is as warm as that
+       where the recording begins.
+    3. The coefficient does nothing where no temperature moves. The rate does nothing where the temperature rises as
+       evenly as a clock, since the two cannot then be told apart.
+    4. ``carried_over``: the share that counts of how much warmer the recording begins than the first of all.
     """
     warmer_k = _warmer_k(conditions)
     moved = np.zeros(conditions.time_s.size)
@@ -66,27 +68,27 @@ def drift(conditions: Conditions, values: Array, exponent: float, carried_over: 
 
 
 def settled_so_far(conditions: Conditions, tau_s: float, stretch: float) -> Array:
-    """(n,) `settled` over the `running_time_s`."""
+    """(n,) `settled` at the `running_time_s`."""
     return conditions.kept("settled", (tau_s, stretch), lambda: settled(running_time_s(conditions), tau_s, stretch))
 
 
 def settled(time_s: Array, tau_s: float, stretch: float) -> Array:
-    """(n,) what has settled of a whole, 1 - exp(-(t/s)^stretch) (Kohlrausch 1854), in the mean time ``tau_s``."""
+    """(n,) the share that has settled at ``time_s``: 1 - exp(-(t/s)^stretch) (Kohlrausch 1854), mean time ``tau_s``."""
     return np.asarray(-np.expm1(-((time_s / _settling_scale(tau_s, stretch)) ** stretch)))
 
 
 def unsettled_in_c(tau_s: float, stretch: float) -> str:
-    """A C expression of ``t`` in s: what has settled, with the other sign."""
+    """Minus `settled`, as a C expression of ``t`` in s."""
     return f"expm1(-pow(t / {c_number(_settling_scale(tau_s, stretch))}, {c_number(stretch)}))"
 
 
 def _settling_scale(tau_s: float, stretch: float) -> float:
-    """s of exp(-(t/s)^stretch) whose mean time of settling is ``tau_s``."""
+    """The s in exp(-(t/s)^stretch) for which the mean time of settling is ``tau_s``."""
     return tau_s / math.gamma(1.0 + 1.0 / stretch)
 
 
 def _warmer_k(conditions: Conditions) -> Array:
-    """The smoothed temperature (n,) above the recording's own first, (0,) where none was logged or it stood still."""
+    """The smoothed temperature (n,) above the recording's own first; (0,) where none was logged or it stood still."""
     known = conditions.cache.get("warmer_k")
     if known is None:
         known = np.zeros(0)
@@ -104,7 +106,7 @@ def _warmer_k(conditions: Conditions) -> Array:
 
 
 def _running_mean(signal: Array, half: int) -> Array:
-    """(n,) means over ``half`` samples on either side, over as many as there are on both near the ends."""
+    """(n,) means over ``half`` samples on either side, near the ends over as many as both sides have."""
     n = signal.size
     k = np.arange(n)
     reach = np.minimum(np.minimum(k, n - 1 - k), half)

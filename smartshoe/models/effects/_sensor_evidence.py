@@ -1,4 +1,4 @@
-"""What a statistical test on a residual found, and the arithmetic that such tests share."""
+"""The result of a statistical test on a residual, and the arithmetic that such tests share."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ LEAST_RHYTHM = 0.1  # sum of squared correlations, above what chance gives
 
 @dataclass(frozen=True)
 class SensorEvidence:
-    """A test that came out: ``value`` of its ``statistic`` above ``threshold``, said in one sentence.
+    """A test that found something: ``value`` of its ``statistic`` is above ``threshold``; ``says`` is its sentence.
 
-    ``strength`` is the standard deviation of what was found, where it is largest, as a share of full scale.
+    ``strength`` is the standard deviation of what was found, as a share of full scale, where it is largest.
     """
 
     statistic: str
@@ -35,9 +35,9 @@ class SensorEvidence:
 
 
 class NoiseEffect(Effect):
-    """Noise that a test finds in what a model leaves; never a cause by its waveform.
+    """Noise that a test finds in the residual of a model; never named as a cause by its waveform.
 
-    ``has_memory``: True where it remembers, as structure does that no effect has explained.
+    ``has_memory``: True for noise that is correlated in time, as structure is that no effect has explained.
     """
 
     is_physical: ClassVar[bool] = False
@@ -47,12 +47,12 @@ class NoiseEffect(Effect):
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
         """What a model's ``residual`` (n,) beside its ``prediction`` (n,), in shares of full scale, shows of it.
 
-        None of nothing, at one false alarm in 1000.
+        None where it shows nothing. The test has one false alarm in 1000.
         """
 
 
 class Waveformless:
-    """What an effect has that is noise: nothing to add to a prediction."""
+    """For effects that are noise: there is nothing to add to a prediction."""
 
     parameters: ClassVar[tuple[EffectParameter, ...]] = ()
     is_physical: ClassVar[bool] = False
@@ -64,14 +64,14 @@ class Waveformless:
 
 @dataclass(frozen=True, eq=False)
 class LocalVariance:
-    """Variance of the residual's fast part in blocks (m,), and what it may follow: squares of pressure and slope."""
+    """Variance (m,) of the residual's fast part in blocks, and squares of pressure and slope (m,) it may follow."""
 
     variance: Array
     pressure_squared: Array
     slope_squared: Array
 
 
-TRIPLETS = 4  # a block's triplets: its log variance has the variance psi'(2), and blocks stay short
+TRIPLETS = 4  # in a block, which stays short: the log of its variance has the variance psi'(2)
 LOG_SD = sqrt(pi**2 / 6.0 - 1.0)
 PRESSURE, SLOPE = 1, 2
 
@@ -79,9 +79,9 @@ PRESSURE, SLOPE = 1, 2
 def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> LocalVariance | None:
     """`LocalVariance` from second differences of separate triplets of samples.
 
-    So neither a smooth misfit nor coloured noise counts. None where too little is there, or where the readings'
-    quantisation grid is coarser than noise.
-    Triplets at a corner of the prediction are left out: a late model leaves its corners in the residual.
+    Second differences hold neither a smooth misfit nor slow noise. Triplets at a corner of the prediction are left out,
+    since a model that is late leaves its corners in the residual. None where too few samples are left, or where the
+    grid of the readings is coarser than the noise.
     """
     if residual.size < LEAST_SAMPLES:
         return None
@@ -110,7 +110,8 @@ def growing_noise(
 ) -> tuple[float, float, LocalVariance] | None:
     """Score, strength and `LocalVariance` where the residual's variance grows with the ``asked`` part; None elsewhere.
 
-    At one false alarm in 1000; `PRESSURE` or `SLOPE`, the growth with the other apart.
+    ``asked`` is `PRESSURE` or `SLOPE`; growth with the other part is fitted apart. The test has one false alarm in
+    1000.
     """
     local = local_variance(residual, prediction, sample_time_s)
     if local is None:
@@ -123,10 +124,10 @@ def growing_noise(
 
 
 def keeps_rhythm(residual: Array, weight: Array) -> bool:
-    """Whether what the fast part of the residual (n,) has more of where ``weight`` (n,) is large is a tone, no noise.
+    """Whether the part of the residual (n,) that is large where ``weight`` (n,) is large is a tone and no noise.
 
-    Ringing after corners (a resonance) is strongest on steep ramps as jitter is; but it repeats itself. What is there
-    all the time (hum) is not counted.
+    Ringing after corners (a resonance) is strongest on steep ramps, as jitter is; but it repeats itself. A tone that is
+    there all the time (hum) is not counted.
     """
     fast = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
     share = (weight[1:-1] / max(float(np.max(np.abs(weight))), 1e-300)) ** 2
@@ -135,29 +136,29 @@ def keeps_rhythm(residual: Array, weight: Array) -> bool:
         fast * np.sqrt((1.0 - share) / max(float(np.sum(1.0 - share)), 1.0)),
     )
 
-    def more(lag: int) -> float:
+    def excess(lag: int) -> float:
         n = fast.size
         return float(np.sum(loud[lag:] * loud[: n - lag]) - np.sum(quiet[lag:] * quiet[: n - lag]))
 
-    power = more(0)
+    power = excess(0)
     if power <= 0.0:
         return False
     by_chance = len(RHYTHM_LAGS) * float(np.sum(loud**4) + np.sum(quiet**4)) / power**2
     # White noise has no correlation left at these lags of its second differences.
-    return sum((more(lag) / power) ** 2 for lag in RHYTHM_LAGS) > LEAST_RHYTHM + 3.0 * by_chance
+    return sum((excess(lag) / power) ** 2 for lag in RHYTHM_LAGS) > LEAST_RHYTHM + 3.0 * by_chance
 
 
 def _second_difference(triplets: Array) -> Array:
-    # Scaled so that white noise keeps its variance.
+    """(m,) second differences of ``triplets`` (m, 3), scaled so that white noise keeps its variance."""
     return (triplets[:, 1] - 0.5 * (triplets[:, 0] + triplets[:, 2])) * sqrt(2.0 / 3.0)
 
 
 def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
     """Score statistic (standard normal without the effect) and coefficient of the ``asked`` part of the variance.
 
-    The variance is a constant, and a part with the pressure's square (`PRESSURE`) and one with the slope's (`SLOPE`).
-    The other part is fitted first, so that one does not stand in for the other. The score looks at logarithms: few
-    blocks are steep, and squares of theirs are too skewed for a normal law at one in a thousand.
+    The variance is modelled as a constant, a part with the square of pressure (`PRESSURE`) and one with that of the
+    slope (`SLOPE`). The other part is fitted first, so that neither stands in for the other. The score is of
+    logarithms: few blocks are steep, and their squares are too skewed for a normal law at one in a thousand.
     """
     columns = np.stack([np.ones(local.variance.size), local.pressure_squared, local.slope_squared], axis=1)
     columns = columns / np.maximum(columns.max(axis=0), 1e-300)
@@ -178,7 +179,10 @@ def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
 
 
 def _variances(columns: Array, variance: Array, used: list[int]) -> Array:
-    """Coefficients (3,) not below zero, weighted as variances of squares ask for (their spread is their mean)."""
+    """Coefficients (3,), none below 0, of the ``used`` ``columns`` (m, 3) in ``variance`` (m,): weighted least squares.
+
+    The weights are those of squares of noise, whose standard deviation is in proportion to their mean.
+    """
     coefficients = np.zeros(columns.shape[1])
     coefficients[0] = float(variance.mean())
     for _ in range(8):

@@ -1,4 +1,4 @@
-"""Springs that bend inside the loop of wall and gas, beside the arm that relaxes."""
+"""What springs share that bend inside the loop of wall and gas, beside the relaxing arm."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from smartshoe.models.effects.effect import Conditions
 
 
 def arm_beside(conditions: Conditions) -> tuple[float, float, float, float]:
-    """kappa of the arm that relaxes, and how its q goes on from sample to sample; an arm of nothing outside a model."""
+    """The relaxing arm's kappa, and the recursion of its q: decay, now, before. Without effect outside a model."""
     from smartshoe.models.first_order import hold_coefficients
 
     share, rate_per_s = conditions.relaxing or (0.0, 0.0)
@@ -18,16 +18,16 @@ def arm_beside(conditions: Conditions) -> tuple[float, float, float, float]:
 
 
 def most_beside(share: float) -> float:
-    """By how much more than its own a spring may deform beside an arm of ``share``, over its own.
+    """How much more a spring beside an arm of ``share`` may deform than alone, at most, over its deformation alone.
 
-    An arm that pushes, as a creeping unit's does, leaves a tenth of the spring's stiffness, at least; else a fit would
-    come upon numbers without bounds.
+    An arm that pushes, as that of a creeping unit, must leave a tenth of the spring's stiffness; a fit would else come
+    upon numbers without bounds.
     """
     return max(-0.9 / share - 1.0, 0.0) if share < 0.0 else math.inf
 
 
 def relaxed(deformation: Array, conditions: Conditions) -> Array:
-    """Load (n,) of the arm that relaxes, kappa (u - q), under a deformation (n,) in straight lines."""
+    """The load (n,) that the relaxing arm bears, kappa (u - q), under a ``deformation`` (n,) in straight lines."""
     from smartshoe.models.first_order import lag
 
     share, rate_per_s = conditions.relaxing or (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""What the effects of wall and contact share: a load cleaned of noise, and inverses that run in a kernel."""
+"""What effects of wall and contact share: the load without its noise, and inverses that run in a kernel."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from smartshoe.models.effects.effect import ChainContext, Conditions, CStep, Eff
 
 LEAST_DEAD_ZONE = 1e-3  # of full scale
 SIGMAS = 4.0
-SETTLED = 1e-15  # of full scale: what a round of an inverse with memory may still move a sample by
+SETTLED = 1e-15  # of full scale: an inverse with memory ends when a round moves a sample by no more
 NO_LOAD = 1e30  # as in `smartshoe.kernels.memory`: before the first sample
 
 
 def dead_zone(conditions: Conditions) -> float:
-    """Half the swing of load that memory must not take for a reversal, a share of full scale."""
+    """Half of the largest swing of load, a share of full scale, that memory takes for noise and for no reversal."""
     return beyond_noise(conditions.load_noise)
 
 
 def beyond_noise(sd: float) -> float:
-    """The same of a signal whose noise has this standard deviation, a share of full scale."""
+    """`dead_zone` for a signal whose noise has the standard deviation ``sd``, a share of full scale."""
     return max(LEAST_DEAD_ZONE, SIGMAS * sd)
 
 
 def cleaned(load: Array, half_width: float) -> Array:
-    """The load (n,) through a play: reversals smaller than twice ``half_width`` are gone."""
+    """The ``load`` (n,) through a play, without reversals smaller than twice ``half_width``."""
     from smartshoe.kernels.memory import backlash
 
     out = np.empty(load.size)
@@ -37,7 +37,7 @@ def cleaned(load: Array, half_width: float) -> Array:
 
 
 def cleaned_load(conditions: Conditions) -> Array:
-    """The measured load (n,) through a play of the noise's width; computed once."""
+    """The measured load (n,) through a play as wide as its noise; computed once."""
     found = conditions.cache.get("cleaned_load")
     if found is None:
         found = conditions.cache["cleaned_load"] = cleaned(conditions.load, dead_zone(conditions))
@@ -45,22 +45,22 @@ def cleaned_load(conditions: Conditions) -> Array:
 
 
 class Remembering(Effect):
-    """An effect that remembers the load as it is seen through a dead zone; so does its inverse, through the chain's."""
+    """An effect that remembers reversals of the load but not swings within its noise, and so does its inverse."""
 
     @abstractmethod
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """The streaming inverse, which takes no swing within twice ``dead_zone`` for a reversal."""
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """The same, of what is clear of the chain's noise."""
+        """`inverse` with a dead zone that is clear of the noise in the ``chain``."""
         return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 @dataclass(eq=False)
 class Undone(Inverse):
-    """An inverse with memory: ``kernel(signal, *constants, state, out)`` fills ``out`` and moves ``state`` on.
+    """An inverse with memory: ``kernel(signal, *constants, state, out)`` fills ``out`` (n,) and moves ``state`` on.
 
-    ``body`` turns a name for identifiers into the same in C; ``members`` names the states in the order of ``start``.
+    ``body`` gives the same step in C for given identifiers; ``members`` names the states in the order of ``start``.
     """
 
     kernel: Callable[..., None]
@@ -77,13 +77,13 @@ class Undone(Inverse):
         self.state = self.start.copy()
 
     def push(self, signal: Array, time_s: Array) -> Array:
-        """What went into the block (n,); the state carries on."""
+        """The block's input (n,); the state carries on from one call to the next."""
         out = np.empty(signal.size)
         self.kernel(np.ascontiguousarray(signal, dtype=float), *self.constants, self.state, out)
         return out
 
     def c_step(self, name: str) -> CStep:
-        """The kernel's step, its search for a root included."""
+        """The kernel's step in C, its search for a root included."""
         names = {member: f"f->{name}_{member}" for member in self.members}
         states = {f"{name}_{member}": float(value) for member, value in zip(self.members, self.start, strict=True)}
         return CStep(states, self.body(names))

@@ -1,4 +1,4 @@
-"""Friction that does not depend on rate, with one smooth state."""
+"""Friction that does not depend on rate, with one state that turns over smoothly (Bouc and Wen)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Reme
 from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
-WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
+WIDTHS, SPACINGS = 10.0, 240  # to how many widths the branch is tabulated, and in how many pieces
 
 
 class BoucWenHysteresis(Remembering):
     """f - h (1 - l f) z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width, gamma + beta = 1 (Wen 1976).
 
-    z in [-1, 1] begins at 0. ``turn`` is beta - gamma: 0 unloads in a straight line, 1 with n = 1 is Dahl's friction.
-    ``fading`` l: friction falls with the load as what slides comes to its end; that which grows from nothing is
-    `play_hysteresis`. None is left from 1/l on, all of it below zero.
+    z in [-1, 1] begins at 0. ``turn`` is beta - gamma: with 0 unloading begins in a straight line, 1 with n = 1 is
+    Dahl's friction. ``fading`` l: friction falls with the load, as what slides comes to its end, and is 0 from 1/l on;
+    below zero load it stays whole. Friction that grows with the load from nothing is `play_hysteresis`.
     """
 
     name, family, stage, place = "bouc_wen_hysteresis", "hysteresis", "wall", "wall"
@@ -60,7 +60,7 @@ class BoucWenHysteresis(Remembering):
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """The load whose friction gives the output, by false position; exact for a load without noise.
 
-        There is one such load where friction turns over less fast than load: half_height (1 + turn) < width.
+        It is the only one where friction turns over less fast than load: half_height (1 + turn) < width.
         """
         from smartshoe.kernels.memory import SOLVED, STEPS, bouc_wen_undone
 
@@ -82,16 +82,16 @@ START = (NO_LOAD, 0.0, 0.0, 0.0)
 
 
 def _branch(values: Array) -> tuple[float, Array, Array]:
-    """Spacings per load, and the rising branch."""
+    """Pieces per load, and the rising branch of z with its slope at the ends of the pieces."""
     width, exponent, turn = (float(value) for value in values[1:4])
     return SPACINGS / (WIDTHS * width), *_rising(exponent, turn)
 
 
 @lru_cache(maxsize=64)
 def _rising(exponent: float, turn: float) -> tuple[Array, Array]:
-    """The branch and its slope, kept, since a fit asks for the same few often.
+    """The rising branch and its slope, cached, since a fit asks for the same few often.
 
-    Nobody may write to them; were they marked so, kernels would be compiled once more.
+    Nobody may write to the arrays. They are not marked read-only, since kernels would be compiled once more for that.
     """
     from smartshoe.kernels.memory import bouc_wen_branch
 

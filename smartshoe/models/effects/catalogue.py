@@ -1,7 +1,7 @@
-"""Every effect: those of this folder, where to add one is to add its file, and those of other packages.
+"""The catalogue of effects: those of this folder, one file each, and those of other packages.
 
-Another package offers one by an entry point of the group `smartshoe.effects`, whose object is an `Effect` or a class
-of it (docs/extending.md).
+Another package offers one by an entry point of the group `smartshoe.effects`, whose object is an `Effect` or a class of
+it (docs/extending.md).
 """
 
 from __future__ import annotations
@@ -27,12 +27,14 @@ ROOM = __name__.rpartition(".")[0]
 
 
 def _concrete(kind: Any) -> list[type[Effect]]:
+    """All classes below ``kind``, itself among them, that have no abstract methods."""
     below = [leaf for child in kind.__subclasses__() for leaf in _concrete(child)]
     return below if getattr(kind, "__abstractmethods__", None) else [kind, *below]
 
 
 @cache
 def _own() -> Mapping[str, Effect]:
+    """The effects of this folder by name."""
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         importlib.import_module(f"{ROOM}.{module.name}")
     own = (kind() for kind in _concrete(Effect) if kind.__module__.startswith(ROOM))
@@ -40,22 +42,27 @@ def _own() -> Mapping[str, Effect]:
 
 
 class _Offer(NamedTuple):
+    """An effect of another package, and the words that name it and the package in an error."""
+
     effect: Effect
     origin: str
 
 
 @cache
 def _offers() -> tuple[Mapping[str, _Offer], tuple[UsageError, ...]]:
-    """The effects of other packages by name, and why others of them are none: what needs these says so, and no more."""
+    """The effects of other packages by name, and the errors of those that are faulty.
+
+    An error is raised only where the effects of other packages are needed.
+    """
     found: dict[str, _Offer] = {}
     broken = []
     for entry in entry_points(group=GROUP):
         origin = _origin(entry, entry.name)  # it may have no other name yet
         try:
-            made = _offered(entry, origin)
-            if made.name in found or made.name in _own():
-                raise UsageError(f"{origin} has the name {made.name!r}, which is taken: give it another name")
-            found[made.name] = _Offer(made, _origin(entry, made.name))
+            offered = _offered(entry, origin)
+            if offered.name in found or offered.name in _own():
+                raise UsageError(f"{origin} has the name {offered.name!r}, which is taken: give it another name")
+            found[offered.name] = _Offer(offered, _origin(entry, offered.name))
         except UsageError as error:
             broken.append(error)
     return MappingProxyType(found), tuple(broken)
@@ -63,6 +70,7 @@ def _offers() -> tuple[Mapping[str, _Offer], tuple[UsageError, ...]]:
 
 @cache
 def _found() -> Mapping[str, Effect]:
+    """All effects by name, in the order of the names; raises the first error of another package's."""
     offers, broken = _offers()
     if broken:
         raise broken[0]
@@ -70,25 +78,26 @@ def _found() -> Mapping[str, Effect]:
 
 
 def _origin(entry: EntryPoint, name: str) -> str:
+    """Words for an effect of another package: "effect 'creased_tube' of the package our-lab"."""
     return f"effect {name!r}" + (f" of the package {entry.dist.name}" if entry.dist else "")
 
 
 def _offered(entry: EntryPoint, origin: str) -> Effect:
     """The effect of another package; raises `UsageError` where it is none, or cannot take part in a chain."""
     try:
-        made = entry.load()
-        made = made() if isinstance(made, type) else made
+        offered = entry.load()
+        offered = offered() if isinstance(offered, type) else offered
     except (Exception, SystemExit) as error:  # whatever another package does
         why = f"{type(error).__name__}: {error}"
         raise UsageError(f"{origin} cannot be loaded ({why}): mend or uninstall the package") from error
-    if not isinstance(made, Effect):
-        raise UsageError(f"{origin} is {made!r}, no smartshoe.models.effects.Effect: mend the package")
-    refuse_faulty(made, origin)
-    return made
+    if not isinstance(offered, Effect):
+        raise UsageError(f"{origin} is {offered!r}, no smartshoe.models.effects.Effect: mend the package")
+    refuse_faulty(offered, origin)
+    return offered
 
 
 def _named(name: str) -> Effect | None:
-    """Ours are found whatever other packages offer."""
+    """The effect ``name``, or None. Those of this folder are found whatever other packages offer."""
     if name in _own():
         return _own()[name]
     offer = _offers()[0].get(name)
@@ -96,13 +105,13 @@ def _named(name: str) -> Effect | None:
 
 
 def origin_of(name: str) -> str:
-    """Who offers the effect ``name``, as an error tells it: "effect 'creased_tube' of the package our-lab"."""
+    """Words for who offers the effect ``name``, for an error: "effect 'creased_tube' of the package our-lab"."""
     offer = None if name in _own() else _offers()[0].get(name)
     return f"effect {name!r}" if offer is None else offer.origin
 
 
 def refuse_other_size(name: str, found: Array, size: int) -> None:
-    """Raises `UsageError` where what the effect ``name`` made of a signal (n,) has another shape."""
+    """Raises `UsageError` where the output ``found`` of the effect ``name`` is not of shape (``size``,)."""
     if found.shape != (size,):
         raise UsageError(
             f"{origin_of(name)} gives values of shape {found.shape} for a signal of shape ({size},): mend or uninstall"
@@ -111,9 +120,10 @@ def refuse_other_size(name: str, found: Array, size: int) -> None:
 
 
 def failure_of_others(error: BaseException) -> str:
-    """The sentence that names the effect of another package in whose code ``error`` was raised, '' where in none's.
+    """The sentence that names the effect of another package in whose code ``error`` was raised; '' where there is none.
 
-    Where no method of an effect is on the way there (an inverse's, say), every effect of that package may be meant.
+    Where the traceback holds no method of an effect (but one of its inverse, say), all effects of that package are
+    named.
     """
     if not _offers.cache_info().currsize:
         return ""  # none was loaded, so none has failed
@@ -135,14 +145,14 @@ def catalogue() -> Mapping[str, Effect]:
 
 @cache
 def blocks() -> Mapping[str, tuple[Effect, ...]]:
-    """The flexible blocks by family: each follows any law of its family, or none that is known; never named."""
+    """The flexible blocks by family: each follows any law of its family, or what no law does; never named as causes."""
     flexible = [one for one in _found().values() if one.is_flexible]
     families = sorted({one.family for one in flexible})
     return MappingProxyType({name: tuple(one for one in flexible if one.family == name) for name in families})
 
 
 def in_words(name: str) -> str:
-    """What a person calls an effect, or any other word of an identifier; a flexible block is one "of free form"."""
+    """What a person calls an effect, or another identifier; a flexible block is one "of free form"."""
     found = _named(name)
     said = f"{name.removeprefix('flexible_')} of free form" if found is not None and found.is_flexible else name
     return said.replace("_", " ")
@@ -181,13 +191,13 @@ def between_clocks(what: Literal["lag", "rate"]) -> Effect:
 
 
 def told_apart_by(one: Effect, other: Effect) -> frozenset[Exposure]:
-    """What tells the two apart, any of these; either may say it of the other."""
+    """What tells the two apart, any of these words; either effect may say it of the other."""
     return one.separated_by.get(other.name, frozenset()) | other.separated_by.get(one.name, frozenset())
 
 
 @cache
 def is_told_from_its_family(one: Effect, present: frozenset[str]) -> bool:
-    """Whether data that holds what is ``present`` tells the branch of an effect from the others of its family."""
+    """Whether what is ``present`` in the data tells the branch of an effect from the others of its family."""
     family = [law for law in catalogue().values() if law.kind == one.kind]
     own, others = ([law for law in family if (law.branch == one.branch) is alike] for alike in (True, False))
     return any(told_apart_by(law, other) & present for law in own for other in others)

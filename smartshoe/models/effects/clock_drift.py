@@ -11,11 +11,12 @@ from smartshoe.models.effects._sensor_clock import running_time_s
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter
 from smartshoe.models.effects.exposure import by
 
-FRACTIONS = 512  # of a sample; between two of them the weights are interpolated, 2e-6 of a signal's highest tones off
+FRACTIONS = 512  # of a sample; interpolating weights between them is 2e-6 off at a signal's highest tones
 
 
 @cache
 def _weights() -> Array:
+    """(fractions, 16) weights by which neighbours give the value at each fraction of a sample."""
     from smartshoe.models.first_order import interpolation_taps
 
     return np.array([interpolation_taps(k / FRACTIONS)[0] for k in range(FRACTIONS + 1)])
@@ -40,11 +41,11 @@ class ClockDrift(Effect):
     why_not_undone = "a stream of readings cannot be moved to another time: shift whole recordings instead"
 
     def late_s(self, values: Array, time_s: float) -> float:
-        """What was lost by then."""
+        """The time lost since the recording's beginning."""
         return float(values[0]) * time_s
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The signal against the other clock."""
+        """The signal (n,) as the other clock logs it."""
         from smartshoe.kernels.sensing import at_places
 
         if values[0] == 0.0:

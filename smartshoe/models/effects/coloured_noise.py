@@ -1,4 +1,4 @@
-"""Noise that remembers: first-order noise above a white floor."""
+"""Noise that is correlated in time: first-order noise above a white floor."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from smartshoe.signals.noise import autocovariance
 if TYPE_CHECKING:
     from smartshoe.signals.loading import Cycle
 
-MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each
+MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # correlation times in samples that are tested
 QUANTILE = 3.588  # normal, of one false alarm in 1000 over the number of memories
 LEAST_INDEPENDENT = 40  # segments of one memory's length, below which that memory is left out
-SAME_LOAD = 0.05  # of the peak: loads that are equal
-CORNER = 0.1  # of the noise: a prediction that bends more from one sample to the next
+SAME_LOAD = 0.05  # of the peak: loads that differ by less are equal
+CORNER = 0.1  # of the noise: where a prediction bends by more from one sample to the next is a corner
 
 
 class ColouredNoise(Waveformless, NoiseEffect):
-    """Noise of a correlation time: the sensor's own, or whatever has no place in the catalogue and never repeats."""
+    """Noise with a correlation time: the sensor's own, or what no effect explains and never repeats."""
 
     name, family, stage, place = "coloured_noise", "noise", "sensor", "sensor"
     says = "slow noise that differs from one equal load cycle to the next"
@@ -40,12 +40,14 @@ class ColouredNoise(Waveformless, NoiseEffect):
     }
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
-        """Whether what differs between equal load cycles is correlated in time; None without, or without repeats.
+        """Whether the differences between equal load cycles are correlated in time; None if not, or without repeats.
 
-        Differences between cycles hold neither a misfit that repeats nor (by regression) drifts of zero, gain and
-        clock. In them, a score test of white noise against first-order noise of several memories. It is meant for the
-        residual of a model that was chosen: a strong cause without a place in it, with a memory of the past, leaves
-        differences as well.
+        1. Differences between cycles hold neither a misfit that repeats nor, after a regression, drifts of zero, gain
+           and clock.
+        2. In them white noise is tested against first-order noise of several memories, by a score test.
+
+        It is meant for the residual of a model that was chosen. A strong cause which has no place in that model, and
+        remembers the past, leaves differences between cycles as well.
         """
         covariance, pairs, lengths = np.zeros(0), np.zeros(0), []
         for series, bias, counted in _differences(residual, conditions, prediction):
@@ -82,7 +84,8 @@ class ColouredNoise(Waveformless, NoiseEffect):
 
 
 def _skewness(memory: float, total: int) -> float:
-    # The score is a sum of exponential periodogram values, weighted by the spectrum of the lags' weights.
+    # The score is a sum of periodogram values, exponential each, weighted by the spectrum of the lags' weights.
+    """Skewness of the score for a ``memory`` in samples, by which a normal quantile is corrected."""
     decay = math.exp(-1.0 / memory)
     turn = decay * np.exp(1j * np.pi * (np.arange(8192) + 0.5) / 8192)
     weight = 2.0 * (turn / (1.0 - turn)).real
@@ -90,9 +93,11 @@ def _skewness(memory: float, total: int) -> float:
 
 
 def _differences(residual: Array, conditions: Conditions, prediction: Array) -> Iterator[tuple[Array, Array, Array]]:
-    """Orthonormal contrasts (n,) of equal cycles, what the regression took from their autocovariance (n,), pairs (n,).
+    """By group of equal cycles and contrast: series (n,), bias (n,) and pairs (n,).
 
-    Corners of the prediction count as zero: cycles are aligned to a sample, which is too coarse for them.
+    The series are orthonormal contrasts of the cycles' residuals. ``bias`` is what the regression took from their
+    autocovariance, ``pairs`` how many pairs of samples count at each lag. Corners of the prediction count as zero:
+    cycles are aligned to a sample, which is too coarse for them.
     """
     from smartshoe.signals.loading import by_rate, cycles
 
@@ -100,7 +105,7 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
     for group in by_rate(cycles(conditions.time_s, load)).values():
         starts, n = _equal(group, load)
         if len(starts) > 2:
-            starts = starts[1:]  # the first of its kind comes after others: a wrong memory would tell it from the rest
+            starts = starts[1:]  # the first comes after other loads, and a wrong memory of those would make it differ
         if len(starts) < 2 or n < 30:
             continue
         aligned = np.stack([residual[start : start + n] for start in starts])
@@ -124,11 +129,11 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
 
 
 def _equal(group: Sequence[Cycle], load: Array) -> tuple[list[int], int]:
-    """Where those of one rate begin, and for how many samples, that reach one peak by one course.
+    """Where those cycles of a ``group`` begin that reach one peak along the same load, and for how many samples.
 
-    Where loads differ, what a model misses differs with them: weights that are put on by hand, and random loads, have
-    cycles of one rate and one peak, and no two that are equal. They are laid over each other where they rise through
-    half of their peak, since a cycle after a rest begins anywhere in it.
+    Cycles of one rate and one peak need not have equal loads, as of weights that are put on by hand, or of random
+    loads. They are laid over each other where they rise through half of their peak, since a cycle after a rest begins
+    anywhere in it.
     """
     peaks = np.array([float(load[cycle.start : cycle.stop].max()) for cycle in group])
     within = SAME_LOAD * float(np.median(peaks))
@@ -139,18 +144,18 @@ def _equal(group: Sequence[Cycle], load: Array) -> tuple[list[int], int]:
     before = min(rise - cycle.start for (cycle, _), rise in zip(high, rises, strict=True))
     n = before + min(cycle.stop - rise for (cycle, _), rise in zip(high, rises, strict=True))
     starts = sorted(rise - before for rise in rises)
-    courses = np.stack([load[start : start + n] for start in starts])
-    usual = courses[np.argmin(_rms(courses - np.median(courses, axis=0)))]
-    return [start for start, off in zip(starts, _rms(courses - usual), strict=True) if off <= within], n
+    loads = np.stack([load[start : start + n] for start in starts])
+    usual = loads[np.argmin(_rms(loads - np.median(loads, axis=0)))]
+    return [start for start, difference in zip(starts, _rms(loads - usual), strict=True) if difference <= within], n
 
 
 def _rms(rows: Array) -> Array:
-    """(m,) of each of the rows (m, n)."""
+    """(m,) root mean square of each of the rows (m, n)."""
     return np.asarray(np.sqrt(np.mean(rows**2, axis=1)))
 
 
 def _corners(shape: Array, noise: float) -> Array:
-    """1.0 (n,) within three samples of where ``shape`` (n,) bends by more than its own noise and ``noise`` allow."""
+    """(n,) 1.0 within three samples of where ``shape`` (n,) bends by more than it usually does and ``noise`` hides."""
     bend = np.abs(np.diff(shape, 2, prepend=shape[0], append=shape[-1]))
     corner = bend > max(CORNER * noise, 6.0 * float(np.median(bend)))
     return np.asarray(np.minimum(np.convolve(corner, np.ones(7), mode="same"), 1.0))

@@ -50,11 +50,12 @@ class ContactArea(Effect):
 
     @staticmethod
     def _bend(values: Array) -> tuple[float, float]:
+        """b and q of the formula, from the bow at half of full scale and the curvature."""
         bow, q = (float(value) for value in values)
         return math.log1p(2.0 * bow) * q / (1.0 - 0.5**q), q
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Newton in ln f, and the tangent beyond full scale."""
+        """By Newton's iteration in ln f, and along the tangent beyond full scale."""
         b, q = self._bend(values)
 
         def undo(signal: Array, time_s: Array) -> Array:

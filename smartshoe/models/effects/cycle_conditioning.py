@@ -1,4 +1,4 @@
-"""A gain that settles over load cycles, or with the way that the load goes, not over time."""
+"""A gain that settles over load cycles, or with the path that the load goes, and not over time."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETT
 from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
-LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
-MOST_ROUNDS = 60  # of a contraction that halves what is off
+LEAST_HEIGHT = 0.08  # of full scale: lower cycles do not count
+MOST_ROUNDS = 60  # of a contraction that halves the error each time
 MEMBERS = ("count", "trough", "peak", "place", "gone")
 
 
 class CycleConditioning(Remembering):
     """f (1 + m (1 - exp(-n))), n = (1 - w) (N/n0)^stretch + w L/(2 n0).
 
-    N are the cycles of 8 % of full scale and more that are over (shakedown by counting), L is the way that the load has
-    gone up and down, in full scales (endochronic, Valanis 1971): one cycle to full scale is one of either. A stretch
-    below 1 is of many numbers of cycles at once (Kohlrausch's, over cycles): fast at first, and for long not over.
+    N is the number of finished cycles of at least 8 % of full scale (shakedown by counting). L is the path that the
+    load has gone up and down, in full scales (endochronic, Valanis 1971): one cycle to full scale counts as one of
+    either. A stretch below 1 is a mixture of settling numbers (Kohlrausch's, over cycles): fast at first, with a long
+    tail.
     """
 
     name, family, stage, place = "cycle_conditioning", "softening", "wall", "wall"
@@ -48,7 +49,7 @@ class CycleConditioning(Remembering):
     }
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The load with the gain so far; ``before["cycles"]`` and ``before["way"]`` count along."""
+        """The load with the gain so far; ``before["cycles"]`` and ``before["way"]`` of earlier recordings count."""
         if values[0] == 0.0:
             return signal.copy()
         gained, cycles, by_way, stretch = (float(value) for value in values)
@@ -57,7 +58,7 @@ class CycleConditioning(Remembering):
         return signal * (1.0 - gained * np.expm1(-count))
 
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
-        """Divide by the gain so far, counting cycles and way of what comes out; exact but for what counts as noise."""
+        """Divide by the gain so far, counting cycles and path of its own output; exact but for the dead zone."""
         from smartshoe.kernels.memory import CYCLE_ENDS, conditioned_undone
 
         gained, per_cycle, by_way, stretch = float(values[0]), 1.0 / float(values[1]), *map(float, values[2:])
@@ -113,13 +114,13 @@ class CycleConditioning(Remembering):
 
 
 def half_way(conditions: Conditions) -> Array:
-    """Half the way (n,) that the load has gone up and down since the recording began, but for its noise."""
+    """Half the path (n,) that the load has gone up and down since the recording began, without its noise."""
     load = cleaned_load(conditions)
     return np.asarray(0.5 * np.cumsum(np.abs(np.diff(load, prepend=load[0]))))
 
 
 def _done(conditions: Conditions) -> tuple[Array, Array]:
-    """Cycles that are over (n,) and half the way of the load (n,), neither by its noise; computed once."""
+    """Finished cycles (n,) and half the path of the load (n,), both without its noise; computed once."""
     done, gone = conditions.cache.get("cycles_done"), conditions.cache.get("way_gone")
     if done is None or gone is None:
         from smartshoe.kernels.memory import cycles_done

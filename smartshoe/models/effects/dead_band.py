@@ -1,4 +1,4 @@
-"""Load that does not reach the tube: gaps to close first."""
+"""A dead band: gaps in the contact must be closed before load reaches the tube."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
-LEAST_ONSET = 1e-9  # stands for none
-MOST = 1.3  # times the lost load: a band that is sharp at its end loses a little more before it
+LEAST_ONSET = 1e-9  # stands for an onset of 0
+MOST = 1.3  # times the lost load: a band with a sharp end loses a little more just before it
 
 
 class DeadBand(Effect):
     """f - f0 m(f/f0), m(x) = x at first and 1 later, rounded over ``softness``: f - f0 once all gaps are closed.
 
-    m(x) = [k s(b/k) - k s((b - x)/k) - a e (1 - exp(-x/a))]/[k s(b/k) - a e], b = 1 + a, s(y) = ln(1 + exp y) and e its
-    slope at b/k. ``onset`` a, over the lost load, is how soon the loss sets in: 0 at once, as where gaps are to be
-    closed; later where something beside the tube is touched, bears along and then yields. Loads below zero pass
-    unchanged.
+    m(x) = [k s(b/k) - k s((b - x)/k) - a e (1 - exp(-x/a))]/[k s(b/k) - a e], b = 1 + a, s(y) = ln(1 + exp y), and e
+    the slope of s at b/k. ``onset`` a, over the lost load, is the load over which the loss sets in: 0 for gaps, which
+    lose all at once; more where something beside the tube is touched, bears along and then yields. Loads below zero
+    pass unchanged.
     """
 
     name, family, stage, place = "dead_band", "dead_band", "contact", "contact"
@@ -51,7 +51,7 @@ class DeadBand(Effect):
         return _passed(signal, *(float(value) for value in values))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """By false position from y to y + f0; loads within a sharp band cannot be told apart, nor noise about zero."""
+        """By false position from y to y + f0; loads in a sharp band cannot be told apart, nor can noise about zero."""
         from smartshoe.kernels.dead_band import dead_band_undone
         from smartshoe.kernels.memory import SOLVED, STEPS
 
@@ -85,17 +85,19 @@ class DeadBand(Effect):
 
 
 def _soft(y: Array) -> Array:
+    """s(y) = ln(1 + exp y) (n,), without overflow."""
     return np.maximum(y, 0.0) + np.log1p(np.exp(-np.abs(y)))
 
 
 def _constants(soft: float, onset: float) -> tuple[float, float, float]:
-    """k s(b/k), what m is divided by, and a e."""
+    """Of the formula k s(b/k), the divisor of m, and a e."""
     end = np.array([(1.0 + onset) / soft])
     begins, late = soft * float(_soft(end)[0]), onset / float(1.0 + np.exp(-end[0]))
     return begins, begins - late, late
 
 
 def _passed(load: Array, lost: float, soft: float, onset: float) -> Array:
+    """The load (n,) that reaches the tube, by the formula."""
     begins, whole, late = _constants(soft, onset)
     z = np.maximum(load / lost, 0.0)
     sets_in = late * np.expm1(-z / max(onset, LEAST_ONSET))

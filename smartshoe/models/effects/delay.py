@@ -10,10 +10,11 @@ from smartshoe.models.effects.exposure import by
 
 
 class Delay(Effect):
-    """y(t - delta), fractions of a sample allowed; delta < 0 where the load is the late one.
+    """y(t - delta), delta any fraction of samples; delta < 0 where the load is the late one.
 
-    Band-limited (16 neighbours), so that noise is not smoothed by an amount that depends on the fraction. The end
-    values hold beyond the ends. There is no streaming inverse: it would need the future.
+    Interpolated by a band-limited kernel over 16 neighbours: over few, noise would be smoothed by an amount that
+    depends on the fraction. Beyond the ends the end values hold. A streaming inverse would need the future, so there is
+    none.
     """
 
     name, family, stage, place = "delay", "timing", "logger", "logger"
@@ -30,15 +31,15 @@ class Delay(Effect):
     why_not_undone = "a stream of readings cannot be moved to another time: shift whole recordings instead"
 
     def late_s(self, values: Array, time_s: float) -> float:
-        """Its one value."""
+        """The delay, at any time."""
         return float(values[0])
 
     def delay_s(self, values: Array) -> float:
-        """The same, whatever the time."""
+        """The delay."""
         return self.late_s(values, 0.0)
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The delayed signal."""
+        """The delayed signal (n,)."""
         from smartshoe.kernels.shift import shift
 
         if values[0] == 0.0:

@@ -1,4 +1,4 @@
-"""Readings that are gone for a while."""
+"""Readings that are lost for a while."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from smartshoe.models.effects.exposure import by
 
 
 class Dropouts(Waveformless, Effect):
-    """A lost contact or packet.
+    """A contact or packet that is lost for a while.
 
-    Runs that return to the value of the unloaded unit show them, with edges of one sample.
+    Runs that fall to the unloaded unit's value show it, with edges of one sample.
     """
 
     name, family, stage, place = "dropouts", "data", "logger", "logger"

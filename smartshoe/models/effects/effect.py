@@ -1,4 +1,4 @@
-"""The shape of an effect: a block at one place of the measurement chain, with parameters that have a null value.
+"""What an effect is: a block at one place of the measurement chain, with parameters of which the strengths may be null.
 
 *The chain's units.* Loads are shares of the full-scale load (f = 1 at full scale). Pressures are the same shares: the
 linear core has static gain 1, so that a held load f gives the pressure f, and the sensor's gain (reading per share)
@@ -33,17 +33,16 @@ class EffectParameter:
     """One number of an effect.
 
     ``unit``: SI, or with the words FS_load and FS_reading for a share of the full-scale load or reading
-    ("FS_reading/s"), which a report turns into newtons and the reading's own unit.
-    ``null``: the value at which the effect is the identity; None for a parameter of shape (a time constant, an
-    exponent), which means nothing while the strength is null. ``lower`` and ``upper`` are bounds, a physical sign
-    among them. ``size``: a typical value, or change from null; the step of derivatives is a small part of it.
-    ``prior_sd``: standard deviation of a Gaussian prior about the null value, which a fit takes as one more row of its
-    likelihood; None for a parameter that the data alone decide. ``channel``: what must be logged for the parameter to
-    do anything ("temperature"); '' where it needs nothing but load and time. ``absent``: its value in files of models
-    from before it was known; None where every file holds it. ``kind_ends``: the bounds at which an
-    effect turns into one of another kind, as a relaxation into a drift where its time constant grows beyond all holds;
-    '' where a bound is only as far as anybody has seen. ``natural``: bounds that are no end of what was seen but of
-    what there is, as of a share none and all are: the equation is itself there.
+    ("FS_reading/s"), which a report turns into newtons and the reading's own unit. ``null``: the value at which the
+    effect is the identity; None for a parameter of shape (a time constant, an exponent), which has no meaning while the
+    strength is null. ``lower``, ``upper``: bounds, a physical sign among them. ``size``: a typical value, or change
+    from null; the step of a derivative is a small part of it. ``prior_sd``: standard deviation of a Gaussian prior
+    about the null value, which a fit takes as one more row of its likelihood; None for a parameter that the data alone
+    decide. ``channel``: what must be logged for the parameter to do anything ("temperature"); '' where load and time
+    suffice. ``absent``: its value in files of models that are older than the parameter; None where every file holds it.
+    ``kind_ends``: the bounds at which the effect turns into one of another kind, as a relaxation with a time constant
+    beyond all holds into a drift; '' where a bound is only the farthest that was seen. ``natural``: the bounds of what
+    can be at all, as none and all of a share: at these the equation still holds.
     """
 
     name: str
@@ -70,21 +69,21 @@ class EffectParameter:
         return (above and value >= self.upper) or (below and value <= self.lower)
 
 
-LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
-MOST_KEPT = 6  # of one name: a law's own, and those with one of its shape's numbers moved
+LEAST_CHANGE_K = 0.2  # noise and steps of a cheap probe: a smaller change counts as no change
+MOST_KEPT = 6  # arrays cached by one name: a law's own, and those with one of its shape parameters moved
 
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
     """What a block may know beside its signal: one session (the unit at rest and zeroed before) on an even grid.
 
-    ``time_s`` (n,) from the session's start, step ``step_s``; ``load`` (n,) the measured load as a share of full
-    scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
-    load, cycles, time, dose) where this one continues it, and ``earlier`` (m,) the load up to then on the same step,
-    (0,) where it continues none. ``temperature_k`` (n,) above the first value of the first session, and ``neighbour``
-    (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
-    ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, for effects that say that
-    they bend beside it; None for all others, and outside a model.
+    ``time_s`` (n,) from the session's start at a step of ``step_s``; ``load`` (n,) the measured load as a share of full
+    scale; ``load_noise`` the standard deviation of its noise. ``before``: what an earlier recording left behind
+    (largest load, cycles, time, dose) where this one continues it; ``earlier`` (m,): the load up to then on the same
+    step, (0,) where it continues none. ``temperature_k`` (n,) above the first value of the first session, and
+    ``neighbour`` (n,), the pressure of another unit as a share of this unit's full scale, are None where not logged.
+    ``relaxing``: share and rate in 1/s of the model's relaxing arm, for effects that bend beside it; None for all
+    others, and outside a model.
     """
 
     time_s: Array
@@ -101,20 +100,20 @@ class Conditions:
     _kept: dict[str, dict[tuple[float, ...], Array]] = field(default_factory=dict, init=False, repr=False)
 
     def within(self, share: float, rate_per_s: float) -> Conditions:
-        """The same conditions, and what was derived from them, within a model whose arm relaxes so."""
+        """The same conditions, with all that was derived from them, in a model with such a relaxing arm."""
         return replace(self, relaxing=(share, rate_per_s))
 
     def until(self, last_s: float) -> Conditions:
-        """The same with a clock that stands still from ``last_s`` on, seconds since the session began."""
+        """The same with a clock that stands still from ``last_s`` seconds after the session began."""
         stands_s = last_s - self.before.get("time_s", 0.0)
         if not self.time_s.size or self.time_s[-1] <= stands_s:
             return self
         return replace(self, time_s=np.minimum(self.time_s, stands_s))
 
     def kept(self, name: str, numbers: tuple[float, ...], make: Callable[[], Array]) -> Array:
-        """What ``make`` derives from these conditions and ``numbers`` alone: the last few by a name are kept.
+        """Array that ``make`` derives from these conditions and ``numbers`` alone; the last few by a name are cached.
 
-        A fit asks for the same again wherever it moves another parameter. Nobody may write to what it gives.
+        A fit asks for the same one again whenever it moves another parameter. Nobody may write to the array.
         """
         known = self._kept.setdefault(name, {})
         found = known.pop(numbers, None)
@@ -127,7 +126,7 @@ class Conditions:
 
     @property
     def rate_per_s(self) -> Array:
-        """(n,) the load's slope in full scales a second, central differences."""
+        """(n,) the load's slope in full scales a second, by central differences."""
         found = self.cache.get("rate_per_s")
         if found is None:
             found = np.gradient(self.load, self.step_s) if self.load.size > 1 else np.zeros(self.load.size)
@@ -136,27 +135,27 @@ class Conditions:
 
     @property
     def begins_warmer_k(self) -> float:
-        """By how much it begins warmer than the first session did; 0 where no cheap probe would show it."""
+        """How much warmer in K the recording begins than the first session; 0 where a cheap probe would not show it."""
         begins = 0.0 if self.temperature_k is None else float(self.temperature_k[0])
         return begins if abs(begins) >= LEAST_CHANGE_K else 0.0
 
 
 class Inverse(ABC):
-    """A block's inverse, run on a stream: the same numbers for any chunking."""
+    """The inverse of a block, run on a stream; it gives the same numbers however the stream is cut into chunks."""
 
     @abstractmethod
     def push(self, signal: Array, time_s: Array) -> Array:
-        """What went into the block (n,) from what came out of it (n,), at ``time_s`` (n,) since the session began."""
+        """The block's input (n,) from its output ``signal`` (n,), at ``time_s`` (n,) since the session began."""
 
     def reset(self) -> None:  # noqa: B027 - a block without memory has nothing to forget
         """Forget the past."""
 
     @abstractmethod
     def c_step(self, name: str) -> CStep:
-        """The same as C99, for the export; ``name`` is unique in the chain and goes before every identifier."""
+        """The inverse as C99, for the export; ``name`` is unique in the chain and precedes every identifier."""
 
     def c_single(self, name: str) -> CStep:
-        """`c_step` in the form that loses least in single precision: written in doubles, turned into floats later."""
+        """`c_step` in the form that loses least in single precision; written in doubles, turned into floats later."""
         return self.c_step(name)
 
 
@@ -176,7 +175,8 @@ class CStep:
 class ChainContext:
     """What an inverse may know of the chain that it stands in.
 
-    ``arm`` is the baseline's; ``noise`` the rms of what comes in that is none of the load, a share of full scale.
+    ``arm``: the baseline's relaxing arm. ``noise``: rms, as a share of full scale, of what is in the signal but not of
+    the load.
     """
 
     arm: Arm
@@ -186,33 +186,33 @@ class ChainContext:
 class Effect(ABC):
     """One effect of the catalogue; a subclass a file, one instance a class.
 
-    ``shapes``: points of a grid over the parameters without a null value, where the screen takes sensitivities.
+    ``shapes``: points of a grid over the parameters without a null value, at which the score test takes sensitivities.
     ``needs``: channels without which it cannot be seen ("neighbour").
-    ``exposed_by``: what a protocol must hold, in the words of `smartshoe.models.effects.exposure`.
-    ``separated_by``: neighbour's name to the words for what tells it from this one, any of them; the neighbour says
-    the same of this one.
-    ``is_physical``: False for noise and faults of the data, which are never a cause by their waveform.
-    ``is_latency``: True where the reading comes late, or early, and is changed in nothing else.
+    ``exposed_by``: what a protocol must hold to show it, in the words of `smartshoe.models.effects.exposure`.
+    ``separated_by``: by another effect's name, the words for what tells the two apart, any of them suffices.
+    ``is_physical``: False for noise and faults of the data, which are never named as a cause by their waveform.
+    ``is_latency``: True where the reading comes late, or early, and is not changed otherwise.
     ``is_seen_at_rest``: True where the reading without load shows the effect's size.
     ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
-    ``between_clocks``: "lag" or "rate" where the one value of a latency is what two clocks differ by.
+    ``between_clocks``: "lag" or "rate" where the one value of a latency is a difference of two clocks.
     ``is_drift``: True where it goes on with the time since the session began, whatever the load; on a stream it is
     undone by a `Memoryless` inverse, if at all.
-    ``is_leak``: True where air leaves the tube, so that an inverse sums up what is gone from the readings.
-    ``clips``: a reading that it moves tells no load any more.
+    ``is_leak``: True where air leaves the tube, so that an inverse sums up from the readings what has left.
+    ``clips``: True where a reading that it changes no longer tells the load.
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
-    ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause;
-    ``is_refinement`` where it follows members of other families too, and so tells no kind.
+    ``is_flexible``: True for a block that follows any member of its family; it is never named as a cause.
+    ``is_refinement``: True where such a block follows members of other families too, so that it tells no kind.
     ``why_unnamed``: of a block that follows what no law of the catalogue does, what the reading then does.
     ``is_steep_undone``: True where half a spacing of single precision in a signal moves the load by 3e-7 of full scale.
     ``is_memoryless``: True where the reading is a function of the present load alone.
-    ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
-    ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
-    ``branch``: which of its family's, where that has several that may be there together and be told for one another.
-    ``never_fades``: True where what past loads left behind stays as it is until the next ones, as friction does.
-    ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
-    ``of_either_sign``: what it and its strength say where the strength may have either sign, as the reading of any
-    other sensor than a gas's pressure may fall as well as creep up in holds; None of one whose sign is what it is.
+    ``bends_beside_arm``: True where it needs ``conditions.relaxing``, which a model gives to such effects only.
+    ``imitates``: another family, of which the effect counts as a member where no fault of the data speaks for it.
+    ``branch``: a part of its family, where that has several effects that may be there together and be mistaken for one
+    another.
+    ``never_fades``: True where what past loads left behind stays until the next ones, as in friction.
+    ``mechanism``: what effects of several families are limits of, so that the departure of one looks like another.
+    ``of_either_sign``: what the effect and its strength say where the strength may have either sign, as the reading
+    of any sensor but a gas's pressure may fall as well as creep up in holds; None where the sign is fixed.
     """
 
     name: ClassVar[str]
@@ -248,56 +248,56 @@ class Effect(ABC):
 
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The block's output (n,) for its input (n,); ``values`` in the order of ``parameters``. Never in place."""
+        """The block's output (n,) for its input ``signal`` (n,); ``values`` in the parameters' order. Not in place."""
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
-        """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""
+        """The inverse on a stream; None where there is none (a delay, noise, a signal lost to saturation)."""
         return None
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse | None:
-        """The same in a chain, for what bends beside its arm, or must not remember its noise."""
+        """`inverse` for a place in a ``chain``: for effects that bend beside its arm or remember reversals."""
         return self.inverse(values, step_s)
 
     @property
     def kind(self) -> str:
-        """The family that it is a law of, or counts as one of."""
+        """The family of which the effect is a law, or counts as one."""
         return self.imitates or self.family
 
     @property
     def needs_cycles(self) -> bool:
-        """Whether it is a memory that nothing but later load cycles show."""
+        """Whether it is a memory that only later load cycles show."""
         return not self.is_memoryless and bool(self.exposed_by) and self.exposed_by <= LATER_CYCLES
 
     @property
     def goes_with_the_clock(self) -> bool:
-        """Whether it goes with time, or with what was borne so far, by what its neighbours are told from it."""
+        """Whether it goes with time, or with what was borne so far, by what tells its neighbours from it."""
         return any(words & CLOCK for words in self.separated_by.values())
 
     def of_any_sensor(self) -> Effect:
-        """The same of a reading that is no pressure: stress, and what a polymer conducts, may give way in holds."""
+        """The effect for a reading that is no pressure: stress, or the conduction of a polymer, may fall in holds."""
         return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
 
     def departs_by(self, values: Array) -> float:
-        """Of a block that follows what no law does: by what share of itself it differs from a law."""
+        """By what share of itself the effect differs from a law, of a block that follows what no law does."""
         return 1.0
 
     def falling_at(self, rate_per_s: float, wall_ratio: float) -> Array | None:
-        """The parameters by which the reading of a held load falls at a rate, None of one that makes none fall so.
+        """Values by which the reading of a held load falls at ``rate_per_s``; None if the effect makes none fall so.
 
-        ``wall_ratio``: 1 + k1 x0^2/(nRT), how stiff the wall is beside the gas.
+        ``wall_ratio``: 1 + k1 x0^2/(nRT), how stiff wall and gas are over the gas alone.
         """
         return None
 
     def late_s(self, values: Array, time_s: float) -> float:
-        """By how much a reading of a steady ramp is late ``time_s`` into a recording, of one that ``is_latency``."""
+        """How late in s the reading of a steady ramp is ``time_s`` into a recording, if the effect ``is_latency``."""
         return 0.0
 
     def delay_s(self, values: Array) -> float:
-        """The constant time by which it makes a reading late, and which a whole recording can be shifted back by."""
+        """The constant time in s by which the reading is late, and by which a whole recording can be shifted back."""
         return 0.0
 
     def shapes_with(self, channels: Collection[str]) -> tuple[Mapping[str, float], ...]:
-        """``shapes`` where these are logged: those that differ by what needs another channel are one."""
+        """``shapes`` where these ``channels`` are logged; those that differ only by another channel count as one."""
         inert = {p.name for p in self.parameters if p.channel and p.channel not in channels}
         seen: dict[tuple[tuple[str, float], ...], Mapping[str, float]] = {}
         for shape in self.shapes:
@@ -305,7 +305,7 @@ class Effect(ABC):
         return tuple(seen.values())
 
     def start(self, shape: Mapping[str, float] | None = None) -> Array:
-        """Null strengths with the shape parameters at ``shape``, or at the first of ``shapes``."""
+        """Null strengths, with the shape parameters at ``shape``, or at the first of ``shapes``."""
         at = {**self.shapes[0], **(shape or {})}
         missing = [p.name for p in self.parameters if p.null is None and p.name not in at]
         if missing:
@@ -315,9 +315,10 @@ class Effect(ABC):
     def begun(
         self, shape: Mapping[str, float] | None = None, sizes: float = 0.5, logged: Collection[str] = ()
     ) -> Array:
-        """As `start`, with each strength ``sizes`` typical ones away from null, on the side that physics allows.
+        """As `start`, with each strength ``sizes`` typical sizes away from null, on the side that physics allows.
 
-        Those of a channel that is not ``logged`` stay at null: nothing would move them from where they begin.
+        A strength that needs a channel which is not ``logged`` stays null: no data would move it from where a fit
+        begins.
         """
         values = self.start(shape)
         for k, p in enumerate(self.parameters):
@@ -332,14 +333,14 @@ class Effect(ABC):
 
 @cache
 def _of_either_sign(effect: Effect, says: str, of_strength: str) -> Effect:
-    """``effect`` with as much room on the other side of null."""
+    """``effect`` with its strengths' bounds as far from null on the other side as on the usual one."""
     strengths = (
         one if one.null is None else replace(one, says=of_strength, lower=2.0 * one.null - one.upper)
         for one in effect.parameters
     )
-    made = copy(effect)
-    vars(made).update(says=says, parameters=tuple(strengths))
-    return made
+    variant = copy(effect)
+    vars(variant).update(says=says, parameters=tuple(strengths))
+    return variant
 
 
 class CoreEffect(Effect):
@@ -349,8 +350,8 @@ class CoreEffect(Effect):
 
     @abstractmethod
     def elements(self, values: Array) -> tuple[Element, ...]:
-        """What it adds to the network."""
+        """The elements that it adds to the network."""
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The network with these elements alone: no relaxation of the baseline, unit static gain."""
+        """The output (n,) of a network of these elements alone: without the baseline's arm, of static gain 1."""
         return Core(self.elements(values)).simulate(signal, conditions.step_s)

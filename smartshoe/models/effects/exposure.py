@@ -1,4 +1,4 @@
-"""What shows an effect, and what tells two apart: one vocabulary for effects, protocols and the next experiment."""
+"""One vocabulary for what shows an effect and what tells two apart: of effects, protocols and the next experiment."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ CHANNELS: frozenset[Exposure] = frozenset(
 )
 """Words that ask for a channel and not for a load history."""
 CLOCK: frozenset[Exposure] = frozenset({"idle", "pauses", "shuffled_loads"})
-"""What tells an effect that goes with time, or with what was borne so far, from one that goes with the load."""
+"""Words for what tells an effect of time, or of what was borne so far, from an effect of the present load."""
 LATER_CYCLES: frozenset[Exposure] = frozenset({"peaks", "pauses", "repeats", "shuffled_loads"})
-"""Of what a recording of a single load cycle shows nothing."""
+"""Words for what a recording of a single load cycle cannot hold."""
 WORDS: frozenset[str] = frozenset(get_args(Exposure))
 
 

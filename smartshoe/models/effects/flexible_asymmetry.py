@@ -1,4 +1,4 @@
-"""A gain that depends on the direction of loading, remembered through holds for any time: asymmetry without a law."""
+"""A gain that depends on the direction of loading, with a memory of any length: asymmetry without a law."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from smartshoe.models.effects.exposure import by
 
 
 class FlexibleAsymmetry(Remembering):
-    """f (1 - a (1 - s)/2) with ds = (sgn(df) - s) |df|/turn - s dt/T: a sense of motion that fades in T.
+    """f (1 - a (1 - s)/2) with ds = (sgn(df) - s) |df|/turn - s dt/T: a sense of motion s that fades in the time T.
 
-    Where T is long the sense is kept through holds; where it is short, s = r/(r + turn/T) on a ramp of rate r, which is
-    a friction that turns over with a slow velocity (Oden and Martins 1985).
+    Where T is long the sense is kept through holds. Where it is short, s = r/(r + turn/T) on a ramp of rate r: a
+    friction that turns over with a slow velocity (Oden and Martins 1985).
     """
 
     name, family, stage, place = "flexible_asymmetry", "asymmetry", "wall", "wall"
@@ -33,9 +33,10 @@ class FlexibleAsymmetry(Remembering):
         return by_sense(signal, conditions, *_constants(values, conditions.step_s))
 
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
-        """The load whose own sense gives the output, by false position; exact for a load without noise."""
+        """The load whose sense of motion gives the output, by false position; exact for a load without noise."""
         return undone_by_sense(*_constants(values, step_s), dead_zone)
 
 
 def _constants(values: Array, step_s: float) -> tuple[float, float, float]:
+    """Lost gain, turn in full scales, and how much the sense fades a step."""
     return float(values[0]), float(values[1]), step_s / float(values[2])

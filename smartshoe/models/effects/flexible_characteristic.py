@@ -9,7 +9,7 @@ from smartshoe.models.effects.exposure import by
 
 
 class FlexibleCharacteristic(Effect):
-    """s(p), as `flexible_curve`, of the pressure: the relaxation comes before it."""
+    """s(p), a curve as of `flexible_curve`, but of the pressure, after the relaxation."""
 
     name, family, stage, place = "flexible_characteristic", "static_curve", "sensor", "sensor"
     is_memoryless = True
@@ -23,5 +23,5 @@ class FlexibleCharacteristic(Effect):
         return bent(signal, values)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Exact."""
+        """The inverse curve, exact to rounding."""
         return straightened(values)

@@ -9,10 +9,10 @@ from smartshoe.models.effects.exposure import by
 
 
 class FlexibleCurve(Effect):
-    """s(f), rising everywhere, zero at rest and one at full scale; what it gives passes through the relaxation.
+    """s(f), rising everywhere, zero at rest and one at full scale; it precedes the relaxation.
 
-    s' is a line between six knots, in proportion to 1 + weight at each (`smartshoe.models.effects._monotone_curve`).
-    All weights raised alike are the identity: a fit needs the prior for that direction.
+    s' is linear between six knots, in proportion to 1 + weight at each (`smartshoe.models.effects._monotone_curve`).
+    Equal weights at all knots are the identity, so that a fit needs the weights' prior.
     """
 
     name, family, stage, place = "flexible_curve", "static_curve", "wall", "wall"
@@ -27,5 +27,5 @@ class FlexibleCurve(Effect):
         return bent(signal, values)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Exact."""
+        """The inverse curve, exact to rounding."""
         return straightened(values)

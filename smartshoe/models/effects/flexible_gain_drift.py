@@ -1,4 +1,4 @@
-"""A gain that moves with the clock at a pace of its own: drift without a law."""
+"""A gain that settles with the clock in any way: drift without a law."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from smartshoe.models.effects.gain_drift import LEAST_GAIN
 
 
 class FlexibleGainDrift(Effect):
-    """P (1 + g (1 - exp(-(t/s)^stretch))): fast at first where the stretch is below 1, a line where s is long.
+    """P (1 + g (1 - exp(-(t/s)^stretch))): fast at first where the stretch is below 1, a straight line where s is long.
 
-    A reference ages exponentially, an oxide grows by the root of time (Deal and Grove 1965), a package warms through.
+    A voltage reference ages exponentially, an oxide grows by the root of time (Deal and Grove 1965), a package warms
+    up.
     """
 
     name, family, stage, place = "flexible_gain_drift", "gain_drift", "sensor", "sensor"

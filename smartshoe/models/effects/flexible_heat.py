@@ -1,4 +1,4 @@
-"""Heat of compression that leaves in two times: through what is next to the air, and with what that is next to."""
+"""Heat of compression that leaves with two time constants: through the wall next to the air, and as that wall cools."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from smartshoe.models.elements import Element, Heat
 
 
 class FlexibleHeat(CoreEffect):
-    """Two heat stores, of a share each, so that the overshoot after a ramp falls first fast and then slowly.
+    """Two heat stores, so that the overshoot after a ramp falls fast at first and then slowly.
 
-    A wall of finite heat capacity warms with the air, and both cool together (Carslaw and Jaeger 1959, 1.9); flow that
-    slows down as the air cools does the same.
+    A wall of finite heat capacity warms with the air, and both then cool together (Carslaw and Jaeger 1959, 1.9). A
+    flow that slows down as the air cools acts in the same way.
     """
 
     name, family, stage = "flexible_heat", "gas_heat", "gas"
@@ -30,6 +30,6 @@ class FlexibleHeat(CoreEffect):
     is_flexible = True
 
     def elements(self, values: Array) -> tuple[Element, ...]:
-        """The fast store, then the slow one."""
+        """The fast heat store and the slow one."""
         share, rate, slow_share, slower = (float(value) for value in values)
         return Heat(share * (1.0 - slow_share), rate), Heat(share * slow_share, rate / slower)

@@ -1,4 +1,4 @@
-"""A lag that depends on the direction: a passage that opens one way, as a valve, a flap or a meniscus does."""
+"""A lag that depends on the direction, as behind a valve, a flap or a meniscus that opens one way."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from smartshoe.models.effects.exposure import by
 class FlexibleLag(Effect):
     """tau (1 + d) y' = P - y while y rises, tau (1 - d) y' = P - y while it falls.
 
-    No law of timing does: a filter and a transport are as late one way as the other. One that is follows nearly as well
-    where d is small. In a single load cycle what goes with the direction may as well go with the time.
+    No law of timing does so: a filter and a transport are as late one way as the other. Such a law follows nearly as
+    well where d is small. In a single load cycle a lag by direction cannot be told from one that changes with time.
     """
 
     name, family, stage, place = "flexible_lag", "timing", "sensor", "sensor"
@@ -40,10 +40,10 @@ class FlexibleLag(Effect):
         return lagged_by_direction(signal, step_s / ((1.0 + direction) * tau), step_s / ((1.0 - direction) * tau))
 
     def departs_by(self, values: Array) -> float:
-        """By the direction's share."""
+        """The share by which rises and falls differ from the mean lag."""
         return abs(float(values[1]))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """P = y + T y', T by the sign of the slope since the last sample; exact for steady ramps."""
+        """P = y + T y', with T by the sign of the slope since the last sample; exact for steady ramps."""
         tau, direction = (float(value) for value in values)
         return Lead((1.0 + direction) * tau / step_s, (1.0 - direction) * tau / step_s, 0.0)

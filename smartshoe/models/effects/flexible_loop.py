@@ -13,14 +13,15 @@ from smartshoe.models.effects._wall_memory import Undone, dead_zone
 from smartshoe.models.effects.effect import Conditions, CStep, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
-HALF_WIDTHS = np.geomspace(0.01, 0.4, 5)  # of the plays, shares of full scale
+HALF_WIDTHS = np.geomspace(0.01, 0.4, 5)  # of the plays, as shares of full scale
 LEAST_LOAD = 0.2  # of full scale: friction that grows with load is in proportion to the load and this
 SCALE = math.log1p(1.0 / LEAST_LOAD)
-USUAL_HEIGHT = 0.01  # of full scale: half of the loop's height by one weight at its prior's standard deviation
-MOST_LOST = 0.5  # of the slope: that standard deviation where the play is narrow
+USUAL_HEIGHT = 0.01  # of full scale: half the height of a loop by one weight at its prior's standard deviation
+MOST_LOST = 0.5  # of the slope: the largest such standard deviation, for narrow plays
 
 
 def _weights(name: str, says: str, height: float) -> tuple[EffectParameter, ...]:
+    """One parameter a play: the share of slope that is lost while the input passes through it."""
     apart = np.diff(HALF_WIDTHS, prepend=0.0)
     return tuple(
         EffectParameter(
@@ -34,14 +35,13 @@ def _weights(name: str, says: str, height: float) -> tuple[EffectParameter, ...]
 
 
 class FlexibleLoop(Effect):
-    """Two Prandtl-Ishlinskii operators, one after the other: friction even over the load, and friction growing with it.
+    """Two Prandtl-Ishlinskii operators in a row: friction that is even over the load, and friction that grows with it.
 
     Each is x - sum of w_k (z_k - z_(k-1)), z_k = x - play_k(x) + r_k the friction of a play of half width r_k, z_0 = 0
-    (Brokate and Sprekels 1996, ch. 2), written so that each weight is a share of slope: while x is between 2 r_(k-1)
-    and 2 r_k past its last reversal, the output moves by 1 - w_k of its move. Weights below 1, each by itself, keep
-    it rising. In the first x is the load, in the second ln(1 + f/0.2)/ln 6 (odd), where equal widths are widths in
-    proportion to f + 0.2. The load has come down before the session, so that there is no friction at rest: the loop
-    closes there.
+    (Brokate and Sprekels 1996, ch. 2). So each weight is a share of slope: while x is between 2 r_(k-1) and 2 r_k past
+    its last reversal, the output moves by 1 - w_k of its move, and rises while all weights are below 1. In the first
+    operator x is the load; in the second it is ln(1 + f/0.2)/ln 6 (odd), in which equal widths are widths in proportion
+    to f + 0.2. The load came down before the session, so that there is no friction at rest and the loop closes there.
     """
 
     name, family, stage, place = "flexible_loop", "hysteresis", "wall", "wall"
@@ -65,33 +65,37 @@ class FlexibleLoop(Effect):
         return _load_of(_looped(_logarithmic(out), growing, zone / (LEAST_LOAD * SCALE)))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """The inverse of the second, then that of the first: exact."""
+        """The inverse of the second operator, then that of the first: exact."""
         even, growing = _banks(values)
         return _Loops(_undone(even), _undone(growing))
 
 
 def _banks(values: Array) -> tuple[Array, Array]:
+    """The weights of the even and of the growing operator, (m,) each."""
     count = HALF_WIDTHS.size
     return np.asarray(values[:count], dtype=float), np.asarray(values[count:], dtype=float)
 
 
 def _logarithmic(load: Array) -> Array:
+    """The load (n,) on the logarithmic scale of the second operator."""
     scaled: Array = np.copysign(np.log1p(np.abs(load) / LEAST_LOAD) / SCALE, load)
     return scaled
 
 
 def _load_of(scaled: Array) -> Array:
+    """The inverse of `_logarithmic`."""
     load: Array = np.copysign(LEAST_LOAD * np.expm1(np.abs(scaled) * SCALE), scaled)
     return load
 
 
 def _operator(half_widths: Array, lost: Array) -> tuple[float, Array, float]:
-    """Weight of the load itself, of the plays (m,), and what is added: an operator as a sum of plays."""
+    """The operator as a sum of plays: the weight of x itself, those of the plays (m,), and a constant."""
     weights = lost - np.append(lost[1:], 0.0)
     return float(1.0 - lost[0]), weights, float(-weights @ half_widths)
 
 
 def _looped(signal: Array, lost: Array, zone: float) -> Array:
+    """An operator with the weights ``lost`` (m,) applied to a ``signal`` (n,); plays are no narrower than ``zone``."""
     if not np.any(lost):
         return signal.copy()
     from smartshoe.kernels.memory import plays
@@ -104,7 +108,7 @@ def _looped(signal: Array, lost: Array, zone: float) -> Array:
 
 
 def _undone(lost: Array) -> Undone:
-    """Another such operator (Krejci and Kuhnen 2001): each of its plays goes with one of the operator's."""
+    """The inverse operator (Krejci and Kuhnen 2001), a sum of plays as well, each moving with one of the operator's."""
     from smartshoe.kernels.memory import plays
 
     own, weights, shift = _operator(HALF_WIDTHS, lost)
@@ -123,7 +127,7 @@ def _undone(lost: Array) -> Undone:
 
 
 class _Loops(Inverse):
-    """What was done second is undone first."""
+    """The inverse of both operators: the second is undone first."""
 
     def __init__(self, even: Undone, growing: Undone) -> None:
         self.even, self.growing = even, growing
@@ -147,6 +151,7 @@ class _Loops(Inverse):
 
 
 def _c_body(states: list[str], shift: float, own: float, half_widths: Array, weights: Array) -> str:
+    """A sum of plays in C."""
     lines = ["    {", f"    const double y = x + {c_number(-shift)};", f"    x = {c_number(own)} * y;"]
     for state, width, weight in zip(states, half_widths, weights, strict=True):
         low, high = f"y - {c_number(width)}", f"y + {c_number(width)}"

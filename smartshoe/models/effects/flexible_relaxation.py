@@ -1,4 +1,4 @@
-"""Any spectrum of relaxation, of either sign: the family of relaxations without a law."""
+"""A spectrum of relaxation of any form and either sign: the family of relaxations without a law."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ class FlexibleRelaxation(CoreEffect):
     is_refinement = True
 
     def elements(self, values: Array) -> tuple[Element, ...]:
-        """Six arms or heats."""
+        """An arm or a heat store at each rate."""
         return tuple(relaxing(float(share), float(rate)) for share, rate in zip(values, RATES_PER_S, strict=True))

@@ -9,7 +9,7 @@ from smartshoe.models.effects.exposure import by
 
 
 class FlexibleSet(Effect):
-    """p + s X0 log(1 + X/X0), X what the wall has borne by loadings and by time.
+    """p + s X0 log(1 + X/X0), X the dose that the wall has borne, by loadings and by time (`_dose_of_loading`).
 
     A wall creeps with the time under load and ratchets with every loading, the more slowly the more it has hardened
     (Lemaitre and Chaboche 1990, ch. 5).
@@ -39,5 +39,5 @@ class FlexibleSet(Effect):
         return signal + Dose(*map(float, values)).grown(signal, conditions)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Subtract the set, by a contraction to the last digit."""
+        """Subtract the set, by an iteration to the last digit."""
         return Dose(*map(float, values)).undone(step_s, False)

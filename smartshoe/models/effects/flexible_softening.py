@@ -1,4 +1,4 @@
-"""A gain that grows with what the wall has borne: softening without a law."""
+"""A gain that grows with the dose of load: softening without a law."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from smartshoe.models.effects.exposure import by
 
 
 class FlexibleSoftening(Effect):
-    """f (1 + g X0 log(1 + X/X0)), X what the wall has borne by loadings and by time.
+    """f (1 + g X0 log(1 + X/X0)), X the dose that the wall has borne, by loadings and by time (`_dose_of_loading`).
 
     Rubber softens fast at first and then ever more slowly, with the number of cycles, their height, or the work done
     (Diani, Fayolle and Gilormini 2009).
@@ -34,5 +34,5 @@ class FlexibleSoftening(Effect):
         return signal * (1.0 + Dose(*map(float, values)).grown(signal, conditions))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Divide by the gain so far, by a contraction to the last digit."""
+        """Divide by the gain so far, by an iteration to the last digit."""
         return Dose(*map(float, values)).undone(step_s, True)

@@ -16,11 +16,12 @@ LEAST_GAIN = 0.01
 class GainDrift(Effect):
     """P (1 + g T (t/T)^m), T = 100 s; with the temperature logged, + g_T dT in the bracket.
 
-    What diffuses in, or grows by diffusion through what has grown, comes with the root of time (Crank 1975). dT is of
-    the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead of a die
-    in its package. g_T is inert without a temperature that moves, g where the temperature is a straight line in time.
-    dT is counted from where a recording begins, and ``carried_over`` of what that is warmer than the first recording's
-    beginning is added: 0 where the span is set anew each time, 1 for one sensor in rooms of any warmth.
+    Diffusion into a sensor, or growth by diffusion through what has grown, goes with the root of time (Crank 1975). dT
+    is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead of a
+    die in its package. g_T does nothing without a temperature that moves, g where the temperature is a straight line in
+    time. dT is counted from a recording's beginning; to it is added the share ``carried_over`` of how much warmer that
+    is than the beginning of the first recording: 0 where the span is set anew each time, 1 for one sensor in rooms of
+    any warmth.
     """
 
     name, family, stage, place = "gain_drift", "gain_drift", "sensor", "sensor"

@@ -1,4 +1,4 @@
-"""Air that stiffens as its volume shrinks (Boyle)."""
+"""Air that stiffens as its volume shrinks (Boyle's law)."""
 
 from __future__ import annotations
 
@@ -48,18 +48,18 @@ class GasCompression(Effect):
         ratio = _beside(float(values[0]), arm[0])
         if ratio == 0.0:
             return signal.copy()
-        # The load of which the linear core made the signal.
+        # The load from which the linear core made the signal.
         load, out = signal + relaxed(signal, conditions), np.empty(signal.size)
         compressed(load, ratio, _stiffness(ratio)[0], *arm, out)
         return out
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """What the arm bears set apart first."""
+        """`inverse` beside the arm, whose load is taken off first."""
         ratio = _beside(float(values[0]), chain.arm.share)
         return GasBesideArm(self.inverse(np.array([ratio]), step_s), ratio, chain.arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """f (static) from p, in closed form."""
+        """The static load from the pressure, in closed form."""
         ratio = float(values[0])
         wall, whole = _stiffness(ratio)
         return Memoryless(
@@ -69,9 +69,9 @@ class GasCompression(Effect):
 
 
 def _beside(ratio: float, share: float) -> float:
-    """The largest ratio up to this one beside an arm of ``share``.
+    """``ratio``, or the largest one that a gas beside an arm of ``share`` may have.
 
-    A gas that stiffens more beside an arm that pushes would ask for less than no absolute pressure
+    A gas that stiffened more, beside an arm that pushes, would need an absolute pressure below zero
     (`kernels.wall_loop.compressed`).
     """
     from smartshoe.models.core import USUAL_WALL_RATIO
@@ -80,7 +80,7 @@ def _beside(ratio: float, share: float) -> float:
 
 
 def _stiffness(ratio: float) -> tuple[float, float]:
-    """The wall's stiffness over the linear gas's, and that of wall and gas from rest to full scale."""
+    """The wall's stiffness over that of the linear gas, and that of wall and gas from rest to full scale."""
     from smartshoe.models.core import USUAL_WALL_RATIO
 
     wall = USUAL_WALL_RATIO - 1.0

@@ -7,7 +7,7 @@ from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Element, Heat
 
-FASTER_MODES = ((0.131, 5.269), (0.177, 12.95))  # 4/j_2^2 and what is left beyond, (j_2/j_1)^2 and (j_3/j_1)^2
+FASTER_MODES = ((0.131, 5.269), (0.177, 12.95))  # (4/j_2^2, (j_2/j_1)^2), and the remaining share, (j_3/j_1)^2
 
 
 class GasHeat(CoreEffect):

@@ -10,7 +10,7 @@ from smartshoe.models.effects.exposure import by
 class HeldSamples(Waveformless, Effect):
     """A logger that repeats its last value when it misses a sample.
 
-    Exact repeats with a moving load show them, jumps follow; a coarse quantisation grid repeats on slow ramps only.
+    Exact repeats under a moving load show it, with jumps after them. A coarse grid repeats values on slow ramps only.
     """
 
     name, family, stage, place = "held_samples", "data", "logger", "logger"

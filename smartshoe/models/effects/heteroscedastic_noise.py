@@ -27,7 +27,7 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
     }
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
-        """Whether the variance of ``residual`` grows with ``prediction``, its growth with the slope apart."""
+        """Whether the variance of ``residual`` grows with ``prediction``; growth with its slope is fitted apart."""
         found = growing_noise(residual, prediction, conditions.step_s, PRESSURE)
         if found is None:
             return None

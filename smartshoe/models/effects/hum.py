@@ -15,27 +15,27 @@ from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.signals.noise import MAINS_HZ
 
-LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect
+LOWEST_HZ = 2.0  # a slower line may be the load's rhythm or an unknown slow effect
 HARMONICS = 7  # of the mains, and of the load's own rhythm
 MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
 NEIGHBOURS = 60  # bins on either side that give the floor
 HANN_CORRELATION = 1.944  # neighbouring bins behind a Hann window are worth half as many independent ones
 SEGMENTS = 30
-STEADY, STEADIER = 0.4, 0.8  # least median over mean of a weak and of a strong tone's power in time; noise has 0.69
+STEADY, STEADIER = 0.4, 0.8  # least median over mean of the power of a weak and of a strong tone; noise has 0.69
 BURST_SAMPLES = 64
-BLOCK_S = 1.0  # over which it is told whether the load rests
+BLOCK_S = 1.0  # blocks in which the load rests or moves
 STILL_PER_S = 0.004  # full scales a second: 3 N/s on 800 N
 LEAST_BLOCKS = 8
-OF_HARMONIC = 0.01  # of a polynomial's power in one line: a load without a rhythm has a thousandth in any
-QUIETER = 0.25  # of a tone's power while the load moves: half its amplitude
+OF_HARMONIC = 0.01  # share of a polynomial's power in one line; without a rhythm of the load a thousandth
+QUIETER = 0.25  # of the tone's power under a moving load, that is half its amplitude
 
 
 @dataclass(frozen=True)
 class HumEvidence(SensorEvidence):
-    """With the line's ``frequency_hz`` as logged, its amplitude's parts (shares of full scale) and its ``sources``.
+    """Evidence of a line at ``frequency_hz`` as logged, with the parts of its amplitude and its ``sources``.
 
-    ``sources``: mains harmonics in Hz that this sampling rate puts there. The tone is cosine cos(2 pi f t) + sine
-    sin(2 pi f t), t from the first sample: the effect's parameters.
+    The tone is ``cosine`` cos(2 pi f t) + ``sine`` sin(2 pi f t), shares of full scale, t from the first sample: the
+    parameters of the effect. ``sources``: harmonics of the mains in Hz that this sampling rate puts there.
     """
 
     frequency_hz: float
@@ -45,7 +45,7 @@ class HumEvidence(SensorEvidence):
 
 
 class Hum(NoiseEffect):
-    """+ a sinusoid. 50 Hz sits at the Nyquist frequency of a 100 Hz log; 60 Hz comes out at 40 Hz there."""
+    """+ a sinusoid. The mains' 50 Hz lie at the Nyquist frequency of a 100 Hz log, and 60 Hz appear there at 40 Hz."""
 
     name, family, stage, place = "hum", "noise", "logger", "logger"
     says = "a steady tone runs through the record, loaded or not: a sharp line in the spectrum"
@@ -75,13 +75,14 @@ class Hum(NoiseEffect):
         )
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> HumEvidence | None:
-        """The strongest line in the spectrum of ``residual`` (n,), `HumEvidence`; None where no line stands out.
+        """The strongest line in the spectrum of ``residual`` (n,), as `HumEvidence`; None where no line stands out.
 
-        Each bin of the periodogram over the mean of its neighbours, which has an F distribution where the noise is
-        locally flat (Fisher's test with a local floor), at one false alarm in 1000 for the whole spectrum; on the whole
-        record and on averages over segments of it, since the mains wander. A line that the ``prediction`` (n,) has as
-        well is the load's, one that comes and goes is ringing, and one that is quieter while the load rests is what the
-        load's moving makes.
+        1. Each bin of the periodogram is divided by the mean of its neighbours. Where the noise is locally flat this
+           has an F distribution (Fisher's test with a local floor); one false alarm in 1000 is allowed for the whole
+           spectrum.
+        2. That is done on the whole record, and on averages over segments of it, since the mains wander.
+        3. A line is not taken that the ``prediction`` (n,) has as well (the load's own), that comes and goes (ringing),
+           or that is quieter while the load rests (an effect of the moving load).
         """
         best: tuple[float, float, float, float] | None = None
         levelled = _levelled(residual) if residual.size >= LEAST_SAMPLES else residual
@@ -116,6 +117,7 @@ class Hum(NoiseEffect):
 
 
 def _tone(time_s: Array, cosine: float, sine: float, frequency: float) -> Array:
+    """The tone (n,) at ``time_s`` (n,)."""
     if cosine == 0.0 and sine == 0.0:
         return np.zeros_like(time_s)
     angle = 2.0 * math.pi * frequency * time_s
@@ -123,13 +125,13 @@ def _tone(time_s: Array, cosine: float, sine: float, frequency: float) -> Array:
 
 
 def alias_hz(frequency_hz: float, sample_time_s: float) -> float:
-    """Where a tone comes out in a log with that sample time: 0 to the Nyquist frequency."""
+    """The frequency, 0 to the Nyquist frequency, at which a tone appears in a log with that sample time."""
     turns = frequency_hz * sample_time_s
     return abs(turns - round(turns)) / sample_time_s
 
 
 def _powers(signal: Array, length: int) -> Array:
-    """Periodograms (segments, bins) behind a Hann window, segments overlapping not at all."""
+    """Periodograms (segments, bins) under a Hann window, of segments that do not overlap."""
     count = signal.size // length
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
     parts = signal[: count * length].reshape(count, length)
@@ -137,7 +139,7 @@ def _powers(signal: Array, length: int) -> Array:
 
 
 def _over_floor(power: Array, half: int, apart: int) -> tuple[Array, Array]:
-    """Each bin over the mean of its neighbours (those ``apart`` bins or nearer left out), and how many these are."""
+    """Each bin over the mean of its neighbours, ``apart`` + 1 to ``half`` bins away, and the number of these."""
     bins = power.size
     running = np.concatenate([[0.0], np.cumsum(power)])
     k = np.arange(bins)
@@ -156,6 +158,10 @@ def _over_floor(power: Array, half: int, apart: int) -> tuple[Array, Array]:
 def _line(
     residual: Array, prediction: Array, length: int, sample_time_s: float
 ) -> tuple[float, float, float, float] | None:
+    """The strongest line that is steady and not the load's: chance, ratio to the floor, threshold, frequency; or None.
+
+    ``length``: samples in a segment of the ``residual`` (n,).
+    """
     from scipy.special import fdtrc, fdtri
 
     powers = _powers(residual, length)
@@ -184,25 +190,25 @@ def _line(
 
 
 def _tone_powers(parts: Array, at_hz: float, sample_time_s: float) -> Array:
-    """(segments,) power of a tone in each of ``parts`` (segments, length), behind a Hann window."""
+    """(segments,) power of a tone in each of ``parts`` (segments, length), under a Hann window."""
     length = parts.shape[1]
     turned = np.exp(-2j * np.pi * sample_time_s * at_hz * np.arange(length)) * np.hanning(length)
     return np.asarray(np.abs(np.sum(parts * turned, axis=1)) ** 2)
 
 
 def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bool:
-    """Whether the tone's power in segments of a thirtieth of the record is much the same throughout.
+    """Whether the tone's power is much the same throughout the record, in segments of a thirtieth of it.
 
-    The stronger the tone above the floor beside it, the steadier it has to be.
+    The stronger the tone is above the floor beside it, the steadier it must be.
     """
     length = residual.size // SEGMENTS
     parts = residual[: SEGMENTS * length].reshape(SEGMENTS, length)
-    beside = 4.0 / (length * sample_time_s)
-    power, *below = (_tone_powers(parts, frequency_hz - away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
+    apart_hz = 4.0 / (length * sample_time_s)
+    power, *below = (_tone_powers(parts, frequency_hz - away * apart_hz, sample_time_s) for away in (0.0, 1.0, 1.5))
     floor = 0.5 * float(sum(np.mean(one) for one in below))
     over = max(float(np.mean(power)) / max(floor, 1e-300) - 1.0, 0.0)
-    if frequency_hz > 0.5 / sample_time_s - beside:
-        # Half the sampling rate shows of a tone what its phase leaves, which turns slowly.
+    if frequency_hz > 0.5 / sample_time_s - apart_hz:
+        # Near half the sampling rate the power of a tone depends on its phase, which turns slowly.
         return bool(np.median(power) > 0.5 * STEADY * np.mean(power))
     return bool(np.median(power) > (STEADY + (STEADIER - STEADY) * over / (over + 3.0)) * np.mean(power))
 
@@ -210,8 +216,8 @@ def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bo
 def _stands_apart(residual: Array, load: Array, prediction: Array, frequency_hz: float, sample_time_s: float) -> bool:
     """Whether the tone is as loud while the ``load`` (n,) rests as while it moves.
 
-    Where there is not enough of both to tell, whether it is no harmonic of what the ``prediction`` (n,) has: that is
-    what a curve or a loop makes of a load with a rhythm.
+    Where there is too little of either to tell: whether it is no harmonic of the ``prediction`` (n,), as a curve or a
+    loop makes of a load with a rhythm.
     """
     length = max(round(BLOCK_S / sample_time_s), 8)
     count = residual.size // length
@@ -221,9 +227,9 @@ def _stands_apart(residual: Array, load: Array, prediction: Array, frequency_hz:
     still = rates < STILL_PER_S
     if min(still.sum(), (~still).sum()) < LEAST_BLOCKS:
         return not _is_harmonic(prediction, frequency_hz, sample_time_s)
-    beside = 4.0 / (length * sample_time_s)
+    apart_hz = 4.0 / (length * sample_time_s)
     centred = parts - parts.mean(axis=1, keepdims=True)
-    whole, *above = (_tone_powers(centred, frequency_hz + away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
+    whole, *above = (_tone_powers(centred, frequency_hz + away * apart_hz, sample_time_s) for away in (0.0, 1.0, 1.5))
     floor = 0.5 * (above[0] + above[1])
     resting = float(whole[still].mean() - floor[still].mean())
     moving = float(whole[~still].mean() - floor[~still].mean())
@@ -233,7 +239,7 @@ def _stands_apart(residual: Array, load: Array, prediction: Array, frequency_hz:
 
 
 def _is_harmonic(prediction: Array, frequency_hz: float, sample_time_s: float) -> bool:
-    """Whether a curve makes a line at that frequency of a ``prediction`` (n,): Chebyshev's polynomials of it do."""
+    """Whether a curve would make such a line of a ``prediction`` (n,), as Chebyshev polynomials of it do."""
     low, high = float(prediction.min()), float(prediction.max())
     if low == high:
         return False
@@ -247,7 +253,10 @@ def _is_harmonic(prediction: Array, frequency_hz: float, sample_time_s: float) -
 
 
 def _levelled(residual: Array) -> Array:
-    """The residual (n,) over its own size nearby: noise that comes in bursts has no lines, but uneven bins."""
+    """The residual (n,) over its own size nearby.
+
+    Noise that comes in bursts has no lines, but its bins are uneven.
+    """
     length = BURST_SAMPLES
     count = residual.size // length
     centred = residual - residual.mean()
@@ -259,7 +268,7 @@ def _levelled(residual: Array) -> Array:
 
 
 def _refined(residual: Array, near_hz: float, sample_time_s: float) -> float:
-    """The frequency of the tone that explains most of the windowed record, within some bins of ``near_hz``."""
+    """The frequency in Hz, within some bins of ``near_hz``, of the tone that explains most of the windowed record."""
     n, nyquist = residual.size, 0.5 / sample_time_s
     turns = -2j * np.pi * sample_time_s * np.arange(n)
     window = np.hanning(n)
@@ -294,7 +303,7 @@ def _refined(residual: Array, near_hz: float, sample_time_s: float) -> float:
 
 
 def _amplitudes(residual: Array, frequency_hz: float, sample_time_s: float) -> tuple[float, float]:
-    """Least squares; at the Nyquist frequency, where the sine is zero, by the smallest pair."""
+    """Cosine and sine part by least squares; at the Nyquist frequency, where the sine is 0, the smallest such pair."""
     angle = 2.0 * np.pi * frequency_hz * sample_time_s * np.arange(residual.size)
     c, s, r = np.cos(angle), np.sin(angle), residual - residual.mean()
     normal = np.array([[np.sum(c * c), np.sum(c * s)], [np.sum(c * s), np.sum(s * s)]])

@@ -42,10 +42,10 @@ class LinearLeak(CoreEffect):
     is_leak = True
 
     def falling_at(self, rate_per_s: float, wall_ratio: float) -> Array:
-        """Of the air that leaves the part 1 - 1/N is seen."""
+        """The leak rate for that fall: of the air that leaves, the part 1 - 1/N is seen."""
         (rate,) = self.parameters
         return np.array([min(rate_per_s / (1.0 - 1.0 / wall_ratio), rate.upper)])
 
     def elements(self, values: Array) -> tuple[Element, ...]:
-        """One leak."""
+        """The leak."""
         return (Leak(float(values[0])),)

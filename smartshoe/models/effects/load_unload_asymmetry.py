@@ -34,5 +34,5 @@ class LoadUnloadAsymmetry(Remembering):
         return by_sense(signal, conditions, float(values[0]), float(values[1]), 0.0)
 
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
-        """The load whose own sense gives the output, by false position; exact for a load without noise."""
+        """The load whose sense of motion gives the output, by false position; exact for a load without noise."""
         return undone_by_sense(float(values[0]), float(values[1]), 0.0, dead_zone)

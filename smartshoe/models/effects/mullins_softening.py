@@ -1,4 +1,4 @@
-"""Rubber that is stiffer the first time than ever after."""
+"""Softening of rubber by its largest load so far: it is stiffer the first time than ever after."""
 
 from __future__ import annotations
 
@@ -20,13 +20,11 @@ from smartshoe.models.effects.exposure import by
 class MullinsSoftening(Effect):
     """f r = u (1 - c tanh(((M^2 r^2 - u^2)/(width + beta M^2))^power)), r = 1 + a tanh(M^2/width), M the largest load.
 
-    c makes the first loading follow the stiff curve and all below it softer (Ogden and Roxburgh 1999; with beta, as
-    Mars 2004 and finite-element codes have it; by the root of the distance, Beatty and Krishnaswamy 2000), a makes the
-    wall softer by what it has borne, the first loading included (damage, Simo 1987): ``at_once`` is the share of the
-    latter.
-    ``gained`` is what the gain rises at half of full scale after full scale, for a share of 0. Of the arm that relaxes
-    beside the spring ``of_arm`` softens with it, as where a material softens as a whole (Simo 1987), and the rest does
-    not.
+    c lets the first loading follow the stiff curve and makes all loadings below M softer (Ogden and Roxburgh 1999; with
+    beta, as in Mars 2004 and finite-element codes; by the root of the distance, Beatty and Krishnaswamy 2000). a makes
+    the wall softer by what it has borne, the first loading included (damage, Simo 1987); ``at_once`` is the share of a.
+    ``gained`` is the rise of the gain at half of full scale after a full load, for ``at_once`` 0. ``of_arm`` is the
+    share of the relaxing arm that softens with the spring, as where a material softens as a whole (Simo 1987).
     """
 
     name, family, stage, place = "mullins_softening", "softening", "wall", "wall"
@@ -61,7 +59,7 @@ class MullinsSoftening(Effect):
     branch = "largest load"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The load that a wall without softening would need; ``before["largest_load"]`` counts."""
+        """The load that a wall without softening would need; ``before["largest_load"]`` counts as well."""
         from smartshoe.kernels.wall_loop import softened
 
         if values[0] == 0.0:
@@ -74,19 +72,19 @@ class MullinsSoftening(Effect):
         return out
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """What the arm bears set apart first."""
-        beside = replace(chain.arm, share=chain.arm.share * (1.0 - float(values[5])))
-        return BesideArm(_undone(*_amounts(values, beside.share), dead_zone=beyond_noise(chain.noise)), beside, step_s)
+        """`inverse` beside the arm, whose load is taken off first."""
+        arm = replace(chain.arm, share=chain.arm.share * (1.0 - float(values[5])))
+        return BesideArm(_undone(*_amounts(values, arm.share), dead_zone=beyond_noise(chain.noise)), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
+        """The static load from u: in closed form below the largest, by Newton above; exact without noise."""
         return _undone(*_amounts(values))
 
 
 def _undone(
     strength: float, width: float, widening: float, raised: float, power: float, dead_zone: float = LEAST_DEAD_ZONE
 ) -> Undone:
-    """The inverse, of `_amounts`."""
+    """The inverse for the constants of `_amounts`."""
     from smartshoe.kernels.memory import CLOSE, EASED, STEPS, softened_undone
 
     def body(of: Mapping[str, str]) -> str:
@@ -130,9 +128,9 @@ def _undone(
 
 
 def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, float, float]:
-    """What is lost below the largest load, its width, what that grows by, the most that a first loading rises, power.
+    """What is lost below the largest load, the width, its growth, the largest rise of a first loading, the power.
 
-    Beside an arm of ``share``: one that pushes leaves a tenth of the wall's own stiffness, at least, softened or not.
+    Beside an arm of ``share`` that pushes, a tenth of the wall's own stiffness is left at least, softened or not.
     """
     from smartshoe.kernels.memory import EASED, softness
 

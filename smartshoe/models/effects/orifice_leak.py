@@ -14,10 +14,10 @@ from smartshoe.models.effects.exposure import by
 
 
 class OrificeLeak(Effect):
-    """w' = lambda p/sqrt(|p|), laminar below a small pressure; p = P - w is what is left.
+    """w' = lambda p/sqrt(|p|), laminar below a small pressure; p = P - w is the pressure that is left.
 
     The rate is of the *reading*: wall and gas are in series, so that of the air lost only the part 1 - 1/N (N about
-    1.6) is seen. Integrated by the trapezoid, implicitly: second order of the step.
+    1.6) is seen. Integrated by the implicit trapezoid, of second order in the step.
     """
 
     name, family, stage, place = "orifice_leak", "leak", "gas", "gas"
@@ -36,7 +36,7 @@ class OrificeLeak(Effect):
     is_leak = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """What is left of the pressure."""
+        """The pressure (n,) that is left."""
         if values[0] == 0.0:
             return signal.copy()
         from smartshoe.kernels.memory import orifice
@@ -47,7 +47,7 @@ class OrificeLeak(Effect):
         return out
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Add what left, integrated from the pressure that is left: exact."""
+        """Add what has left, integrated from the pressure that is left: exact."""
         from smartshoe.kernels.memory import orifice_undone
 
         rate, laminar = float(values[0]) * step_s, float(values[1])

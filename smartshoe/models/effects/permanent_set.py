@@ -1,4 +1,4 @@
-"""A wall that does not come back: what stays grows with the dose of load."""
+"""A permanent set: the wall does not come back, by an amount that grows with the dose of load."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from smartshoe.models.effects.exposure import by
 class PermanentSet(Effect):
     """p + s integral of max(p, 0)^m: the wall's unloaded place moves, and pressure stays when the load goes.
 
-    The dose is of the pressure without the set (a held load's share of full scale), by the trapezoid: second order.
-    m is Findley's stress exponent.
+    The dose is of the pressure without the set (a held load's share of full scale), by the trapezoid, of second order
+    in the step. m is Findley's stress exponent.
     """
 
     name, family, stage, place = "permanent_set", "zero", "wall", "gas"
@@ -38,7 +38,7 @@ class PermanentSet(Effect):
     branch = "set"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The pressure with the set so far; ``before["dose"]`` (full scales times s) counts along."""
+        """The pressure with the set so far; ``before["dose"]`` of earlier recordings (full scales times s) counts."""
         rate, exponent = (float(value) for value in values)
         if rate == 0.0:
             return signal.copy()
@@ -50,7 +50,7 @@ class PermanentSet(Effect):
         return signal + rate * dose
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Subtract the set; exact, the dose being of what comes out."""
+        """Subtract the set; exact, since the dose is of the inverse's own output."""
         from smartshoe.kernels.dose import set_undone
 
         half, exponent = 0.5 * float(values[0]) * step_s, float(values[1])

@@ -22,12 +22,12 @@ LEVELS = np.linspace(0.0, 1.0, 101)
 class PlayHysteresis(Effect):
     """f - h z, z a generalised Prandtl-Ishlinskii operator: plays of half widths 0.3 to 50 % of full scale.
 
-    Their greatest forces have a lognormal density about ``width`` (``spread`` its standard deviation in ln r).
-    ``openness`` 1 weighs stop operators, which slide at any load and so keep a friction without load; 0 weighs relays
-    that are all down without load, friction growing with load b as b (1 - levelling b), so that the loop closes at
-    zero (Mayergoyz 2003, ch. 1; Brokate and Sprekels 1996, ch. 2). Friction that grows in proportion to the
-    load (levelling 0, openness 0) is another gain for unloading: that is `load_unload_asymmetry`, and no play.
-    h is half of the greatest height of the loop from zero to full scale and back.
+    The weights of the plays have a lognormal density about ``width`` (``spread`` its standard deviation in ln r).
+    ``openness`` 1 weighs stop operators, which slide at any load and so keep friction without load. 0 weighs relays
+    that are all down without load, with a friction that grows with load b as b (1 - levelling b), so that the loop
+    closes at zero (Mayergoyz 2003, ch. 1; Brokate and Sprekels 1996, ch. 2). Friction in proportion to the load
+    (levelling 0, openness 0) is another gain for unloading, and no play: that is `load_unload_asymmetry`. h is half of
+    the greatest height of the loop from zero to full scale and back.
     """
 
     name, family, stage, place = "play_hysteresis", "hysteresis", "wall", "wall"
@@ -85,16 +85,16 @@ class PlayHysteresis(Effect):
 def _bank(
     narrowest: float, width: float, spread: float, levelling: float, openness: float
 ) -> tuple[Array, Array, Array]:
-    """Half widths (m,), none below ``narrowest``, and `_weights`: kept, since a fit asks for the same few often.
+    """Half widths (m,), none below ``narrowest``, and `_weights`; cached, since a fit asks for the same few often.
 
-    Nobody may write to them; were they marked so, kernels would be compiled once more.
+    Nobody may write to the arrays. They are not marked read-only, since kernels would be compiled once more for that.
     """
     half_widths = np.maximum(HALF_WIDTHS, narrowest)
     return half_widths, *_weights(half_widths, width, spread, levelling, openness)
 
 
 def _weights(half_widths: Array, width: float, spread: float, levelling: float, openness: float) -> tuple[Array, Array]:
-    """Weights (m,) of relays and of stops, for a loop of half height one."""
+    """Weights (m,) of the relays and of the stops, for a loop of half height 1."""
     weight = np.exp(-0.5 * (np.log(HALF_WIDTHS / width) / spread) ** 2) / HALF_WIDTHS
     low = np.maximum(LEVELS[:, None] - 2.0 * half_widths, 0.0)
     up = np.maximum(np.minimum(LEVELS[:, None], 1.0 - 2.0 * half_widths), low)
@@ -104,6 +104,7 @@ def _weights(half_widths: Array, width: float, spread: float, levelling: float, 
 
 
 def _c_body(states: list[str], strength: float, levelling: float, closed: Array, open_: Array) -> str:
+    """The inverse's step in C."""
     from smartshoe.kernels.memory import SOLVED, STEPS
 
     count = len(states)

@@ -1,4 +1,4 @@
-"""Creep over many decades of time, as rubber shows it: a ladder of relaxing arms."""
+"""Creep over many decades of time, as in rubber: a ladder of relaxing arms."""
 
 from __future__ import annotations
 

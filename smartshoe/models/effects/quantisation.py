@@ -10,7 +10,7 @@ from smartshoe.models.effects.exposure import by
 class Quantisation(Waveformless, Effect):
     """A converter with few bits, or a file written with few digits.
 
-    Equal steps between the distinct values show it; below half a step of noise it is no longer random.
+    Equal steps between the values that occur show it. With noise below half a step its error is no longer random.
     """
 
     name, family, stage, place = "quantisation", "data", "logger", "logger"

@@ -15,11 +15,11 @@ from smartshoe.models.effects.exposure import by
 
 HALF_WINDOW_S = 0.04
 SLOW_PER_S = 0.01  # below this rate the power is rounded off
-LEAST_GAIN = 0.5  # of that at rest: what fast loads may lose, so that no rate makes a reading without a load
+LEAST_GAIN = 0.5  # of the gain at rest: fast loads lose no more, so that no rate turns a reading over
 
 
 class RateGain(Remembering):
-    """f max(1 + g r^m, 1/2), r = |f'| over 1 FS/s: the way gone within 0.08 s, small reversals taken out."""
+    """f max(1 + g r^m, 1/2), r = |f'| over 1 FS/s: the path within 0.08 s over that time, without small reversals."""
 
     name, family, stage, place = "rate_gain", "rate", "wall", "wall"
     is_steep_undone = True
@@ -84,7 +84,7 @@ class RateGain(Remembering):
 
 
 def _rate(conditions: Conditions) -> Array:
-    """Way of the cleaned load over a window about each sample, over its length: a rate that noise does not raise."""
+    """(n,) path of the cleaned load within a window about each sample, over its length: noise does not raise it."""
     way = np.zeros(conditions.load.size)
     np.cumsum(np.abs(np.diff(cleaned_load(conditions))), out=way[1:])
     half_s = max(HALF_WINDOW_S, conditions.step_s)
@@ -94,7 +94,7 @@ def _rate(conditions: Conditions) -> Array:
 
 
 def _later(way: Array, samples: float) -> Array:
-    """``way`` (n,) at places ``samples`` later, linear between samples, its end values beyond its ends."""
+    """``way`` (n,) at places ``samples`` later, linear between samples; beyond its ends its end values."""
     whole = math.floor(samples)
     places = np.clip(np.arange(whole, whole + way.size + 1), 0, way.size - 1)
     at: Array = way[places]

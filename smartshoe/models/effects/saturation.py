@@ -8,7 +8,7 @@ from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter
 from smartshoe.models.effects.exposure import by
 
-RAIL_KNEE = 5e-4  # of full scale: below a sensor's noise, and yet no kink for derivatives to stumble over
+RAIL_KNEE = 5e-4  # of full scale: below a sensor's noise, but smooth enough for derivatives
 
 
 def _above(pressure: Array, level: float, knee: float) -> Array:
@@ -21,9 +21,9 @@ def _above(pressure: Array, level: float, knee: float) -> Array:
 class Saturation(Effect):
     """P - s above(P): of the slope above the level, 1 - s is left (s = 1: the output stands still).
 
-    And max(P, 0) with the weight ``rail``, for a sensor whose membrane does not follow a pressure below zero. What
-    was clipped is lost: there is no inverse. It comes after the sensor's zero and gain, as rails do.
-    A level far below the top or a wide knee would be a curve like any other: the bounds leave those to other blocks.
+    And max(P, 0) with the weight ``rail``, for a sensor whose membrane does not follow a pressure below zero. What was
+    clipped is lost: there is no inverse. The block comes after the sensor's zero and gain, as rails do. With a level
+    far below the top or a wide knee it would be a curve like any other: the bounds leave those to other blocks.
     """
 
     name, family, stage, place = "saturation", "saturation", "sensor", "logger"
@@ -55,7 +55,7 @@ class Saturation(Effect):
     why_not_undone = "what was clipped is lost"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """What the sensor gives."""
+        """The clipped reading (n,)."""
         lost, level, knee, rail = (float(value) for value in values)
         clipped = signal - lost * _above(signal, level, knee)
         if rail != 0.0:

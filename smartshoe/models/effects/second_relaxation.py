@@ -33,5 +33,5 @@ class SecondRelaxation(CoreEffect):
     )
 
     def elements(self, values: Array) -> tuple[Element, ...]:
-        """One arm."""
+        """The arm, or a heat store where the share is negative."""
         return (relaxing(float(values[0]), 1.0 / float(values[1])),)

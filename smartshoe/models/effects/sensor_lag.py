@@ -11,10 +11,10 @@ from smartshoe.models.effects.exposure import by
 class SensorLag(Effect):
     """Two poles, at (1 - r) tau and r tau: 1/((1 - r) tau s + 1)/(r tau s + 1); with r = 0, tau y' = P - y.
 
-    tau is the time by which a steady ramp comes late. Hardly any lag has one pole: a port is followed by a filter.
-    Exact for a pressure that is a cubic through the four samples around each step, straight lines among them; steady
-    before the first one. Signals are smoothed before they are thinned: straight lines between what is left would
-    smooth them once more, and at a lag below the step that is a tenth of what the lag does.
+    tau is the time by which a steady ramp comes late. Hardly any lag has one pole, since a port is followed by a
+    filter. Exact for a pressure that is a cubic through the four samples around each step, straight lines among them,
+    and steady before the first one. Straight lines alone would not do: signals are smoothed before they are thinned,
+    and lines between the remaining samples would smooth them again, by a tenth of the effect of a lag below the step.
     """
 
     name, family, stage, place = "sensor_lag", "timing", "sensor", "sensor"
@@ -37,7 +37,7 @@ class SensorLag(Effect):
     branch = "lag"
 
     def late_s(self, values: Array, time_s: float) -> float:
-        """Both poles' time constants."""
+        """The time constants of both poles together."""
         return float(values[0])
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
@@ -49,15 +49,15 @@ class SensorLag(Effect):
         slow = lagged(signal, step_s / ((1.0 - r) * tau))
         if r * tau == 0.0:
             return slow
-        # In partial fractions, since only what goes into the first pole is known between samples.
+        # In partial fractions, since between samples only the input of the first pole is known.
         fast = lagged(signal, step_s / (r * tau))
         return slow + (r / (1.0 - 2.0 * r)) * (slow - fast)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """P = y + T y' for either pole, with the slope since the last sample.
 
-        Exact for a steady ramp, to first order of the step elsewhere. The recursion's own inverse would be exact, but
-        it rings at half the sampling rate and raises noise thirty times as much.
+        Exact for a steady ramp, to first order in the step elsewhere. The recursion's exact inverse would ring at half
+        the sampling rate, and raise noise thirty times as much.
         """
         tau, r = (float(value) for value in values)
         slow = (1.0 - r) * tau / step_s

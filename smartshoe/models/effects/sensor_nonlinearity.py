@@ -1,4 +1,4 @@
-"""A sensor whose characteristic is no straight line, though right at rest and at full scale."""
+"""A sensor whose characteristic is no straight line, though it is right at rest and at full scale."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from smartshoe.models.effects.exposure import by
 
 SCALES = np.array([4.0, 6.0 * 3.0**0.5, 16.0])  # one over the extremes of c (1 - c) (1 - 2c)^k on 0 ... 1, k = 0, 1, 2
 LEAST_SLOPE = 0.05  # of the straight line's: where it rises less, a reading does not tell its pressure
-STEPS = 30  # of Newton's iteration, halving the bracket where it would leave it
+STEPS = 30  # of Newton's iteration; a step that would leave the bracket halves it instead
 
 
 def _departure(c: Array, weights: Array) -> tuple[Array, Array]:
@@ -25,6 +25,7 @@ def _departure(c: Array, weights: Array) -> tuple[Array, Array]:
 
 
 def _undo(signal: Array, time_s: Array, weights: Array) -> Array:
+    """The pressure (n,) from the reading ``signal`` (n,), by Newton's iteration in a bracket."""
     ends = 1.0 + _departure(np.array([0.0, 1.0]), weights)[1]
     reading = np.clip(signal, 0.0, 1.0)
     low, high, pressure = np.zeros_like(reading), np.ones_like(reading), reading

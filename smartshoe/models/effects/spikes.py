@@ -10,7 +10,7 @@ from smartshoe.models.effects.exposure import by
 class Spikes(Waveformless, Effect):
     """A rare large error of one or two samples (interference, a bad frame).
 
-    A second difference that stands alone shows them; one poisons a reference of a single sample.
+    A second difference that stands alone shows it. One spike spoils a reference that is taken from a single sample.
     """
 
     name, family, stage, place = "spikes", "noise", "logger", "logger"

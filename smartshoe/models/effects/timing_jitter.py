@@ -29,9 +29,10 @@ class TimingJitter(Waveformless, NoiseEffect):
     }
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
-        """Whether the variance of ``residual`` grows with the slope of ``prediction``, its growth with the size apart.
+        """Whether the variance of ``residual`` grows with the slope of ``prediction``; growth with size fitted apart.
 
-        None, too, where it does so by no more than a time stamp leaves open: where within its interval a sample lies.
+        None also where the jitter is no more than a time stamp leaves open: a sample may lie anywhere within its
+        interval.
         """
         found = _found(residual, prediction, conditions.step_s)
         if found is None:
@@ -42,13 +43,13 @@ class TimingJitter(Waveformless, NoiseEffect):
 
 
 def jitter_s(residual: Array, prediction: Array, sample_time_s: float) -> float:
-    """Standard deviation of the sampling time, by the same test; 0 where it finds nothing."""
+    """Standard deviation of the sampling time in s by the same test; 0 where it finds nothing."""
     found = _found(residual, prediction, sample_time_s)
     return found[2] if found is not None else 0.0
 
 
 def _found(residual: Array, prediction: Array, sample_time_s: float) -> tuple[float, float, float] | None:
-    """Score and strength, and the jitter's standard deviation in s; None within what a time stamp leaves open."""
+    """Score, strength, and the jitter's standard deviation in s; None within what a time stamp leaves open."""
     found = growing_noise(residual, prediction, sample_time_s, SLOPE)
     if found is None:
         return None

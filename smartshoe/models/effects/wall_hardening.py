@@ -13,10 +13,11 @@ from smartshoe.models.effects.exposure import by
 
 
 class WallHardening(Effect):
-    """(1 + h) f = u + h [(1 - s) u^3 + s u^5]: k1 grows with strain, the gas takes less and less of the load.
+    """(1 + h) f = u + h [(1 - s) u^3 + s u^5]: k1 grows with strain, and the gas takes less and less of the load.
 
-    An odd curve, from k1 (1 + beta u^2) to beyond the sinh of long chains; zero and full scale stay where they are.
-    Where s < 0 the fifth power would turn it down: beyond its inflection, above full scale, it goes on as its tangent.
+    The odd curve ranges from k1 (1 + beta u^2) to beyond the sinh of long chains; zero and full scale stay in place.
+    Where s < 0 the fifth power would turn it down: beyond its inflection, above full scale, it goes on along its
+    tangent.
     """
 
     name, family, stage, place = "wall_hardening", "static_curve", "wall", "wall"
@@ -49,11 +50,11 @@ class WallHardening(Effect):
         return out
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """What the arm bears set apart first."""
+        """`inverse` beside the arm, whose load is taken off first."""
         return BesideArm(self.inverse(values, step_s), chain.arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """f (static) from u, in closed form."""
+        """The static load from u, in closed form."""
         from smartshoe.kernels.wall_loop import inflection
 
         cubic, fifth = _coefficients(values)
@@ -80,7 +81,7 @@ class WallHardening(Effect):
 
 
 def _coefficients(values: Array) -> tuple[float, float]:
-    """Of u^3 and u^5."""
+    """The coefficients of u^3 and of u^5."""
     bow, steepness = (float(value) for value in values)
     middle = 0.5 + bow
     hardening = bow / (0.5 - (1.0 - steepness) * middle**3 - steepness * middle**5)

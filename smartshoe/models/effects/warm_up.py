@@ -12,8 +12,8 @@ from smartshoe.models.effects.exposure import by
 class WarmUp(Effect):
     """+ w (1 - exp(-(t/T)^stretch)), t from the session's start: w is the whole change, of either sign.
 
-    Die, package and board settle at different speeds; together they look like one that is stretched (below 1). The
-    time constant is the mean time of settling, T Gamma(1 + 1/stretch), which is T at stretch 1.
+    Die, package and board settle at different speeds, and together look like one stretched settling (below 1). The
+    parameter is the mean time of settling, T Gamma(1 + 1/stretch), which is T at stretch 1.
     """
 
     name, family, stage, place = "warm_up", "zero", "sensor", "sensor"
@@ -35,7 +35,7 @@ class WarmUp(Effect):
     is_seen_at_rest = is_drift = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The signal and what the zero has moved."""
+        """The signal (n,) and the change of the zero so far."""
         change, tau, stretch = (float(value) for value in values)
         return signal + change * settled_so_far(conditions, tau, stretch)
 

@@ -12,10 +12,10 @@ from smartshoe.models.effects.exposure import by
 class ZeroDrift(Effect):
     """+ d T (t/T)^m, T = 100 s; with the temperature logged, + b_T dT.
 
-    What diffuses into a sensor comes with the root of time (Crank 1975, ch. 4), what creeps under its own stress with a
-    lower power, and a drift that grows with a higher one. dT is of the sensor's body, which follows the logged
-    temperature by a first-order lag: a probe in the air is ahead of a die in its package. b_T is inert without a
-    temperature that moves, d where the temperature is a straight line in time.
+    Diffusion into a sensor goes with the root of time (Crank 1975, ch. 4), creep under its own stress with a lower
+    power, a drift that grows with a higher one. dT is of the sensor's body, which follows the logged temperature by a
+    first-order lag: a probe in the air is ahead of a die in its package. b_T does nothing without a temperature that
+    moves, d where the temperature is a straight line in time.
     """
 
     name, family, stage, place = "zero_drift", "zero", "sensor", "sensor"
