@@ -55,11 +55,11 @@ def test_strengths_begin_from_their_nulls_within_their_bounds() -> None:
 def test_a_strength_has_the_sign_that_its_bounds_allow() -> None:
     up, down, either = _candidate((0.0, 0.0, 5.0)), _candidate((0.0, -5.0, 0.0)), _candidate((0.0, -5.0, 5.0))
     for one, told in ((up, (True, True, False)), (down, (False, True, True)), (either, (True, True, True))):
-        assert tuple(one.has_sign_of(np.array([by])) for by in (1.0, 0.0, -1.0)) == told
+        assert tuple(one.allows_sign_of(np.array([by])) for by in (1.0, 0.0, -1.0)) == told
     both = _candidate((0.0, 0.0, 5.0), (0.0, -5.0, 0.0))
-    assert both.has_sign_of(np.array([1.0, -1.0]))
-    assert not both.has_sign_of(np.array([1.0, 1.0]))
-    assert not both.has_sign_of(np.array([-1.0, -1.0]))
+    assert both.allows_sign_of(np.array([1.0, -1.0]))
+    assert not both.allows_sign_of(np.array([1.0, 1.0]))
+    assert not both.allows_sign_of(np.array([-1.0, -1.0]))
 
 
 def test_of_a_family_or_the_one_that_is_imitated_there_is_one_but_for_branches_that_the_data_tells() -> None:
@@ -259,7 +259,7 @@ def test_columns_of_a_model_nearby_serve_for_what_is_in_neither() -> None:
     by, anew = linearised(other, sessions, STANDARD), linearised(model, sessions, STANDARD)
     found = linearised(model, sessions, STANDARD, by)
     told, expected = ([(one.name, one.shape, one.columns) for one in each.candidates] for each in (found, anew))
-    assert (told, found.own, found.model) == (expected, anew.own, model)
+    assert (told, found.baseline_count, found.model) == (expected, anew.baseline_count, model)
     assert "saturation" in {one.name for one in found.candidates}  # it is in one of them
     for rows, whole, known in zip(found.rows, anew.rows, by.rows, strict=True):
         assert rows[:, :6] * found.scales[:6] == pytest.approx(whole[:, :6] * anew.scales[:6], abs=1e-12)
@@ -278,7 +278,7 @@ def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     nothing = session_under(some_load(50, 5), np.zeros(50), lost=1.1)
     found = linearised(model, [sessions[0], nothing, sessions[1]], STANDARD)
     assert found.sessions == tuple(sessions)
-    assert (found.own, found.scales[0]) == (3, 1.0)
+    assert (found.baseline_count, found.scales[0]) == (3, 1.0)
     assert [one.columns for one in found.candidates[:2]] == [(4,), (5,)]
     assert [one.name for one in found.candidates[:2]] == ["dead_band", "delay"]
     assert (dict(found.candidates[0].shape), dict(found.candidates[1].shape)) == ({"softness": 0.3, "onset": 0.1}, {})

@@ -226,7 +226,7 @@ def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
     plain = baseline_of(sessions, scale)
     found = fit(likelihood_of(sessions, plain), plain)
     for made in EXPERIMENTS.values():
-        assert Contest(found, found, found).after(made(800.0), 0.02).margin == pytest.approx(0.0, abs=0.1)
+        assert Contest(found, found, found).after_experiment(made(800.0), 0.02).margin == pytest.approx(0.0, abs=0.1)
 
 
 def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
@@ -238,23 +238,23 @@ def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     lag = fit(likelihood, start.with_part(effect("sensor_lag"), np.array([0.02, 0.1])))
     delay = fit(likelihood, start.with_part(effect("delay"), np.array([0.02])))
     now = Contest(lag, delay, fit(likelihood, start))
-    margins = {name: now.after(EXPERIMENTS[name](800.0), 0.02).margin for name in ("steps", "rates", "idle")}
+    margins = {name: now.after_experiment(EXPERIMENTS[name](800.0), 0.02).margin for name in ("steps", "rates", "idle")}
     assert margins["steps"] > 2 * margins["rates"]
     assert margins["steps"] > 2 * margins["idle"]
     for name, margin in margins.items():  # whether it is asked for or not, it grows by as much
         grown = margin - now.margin
-        assert now.after(EXPERIMENTS[name](800.0), 0.02, 1.01 * grown) is None
-        assert now.after(EXPERIMENTS[name](800.0), 0.02, 0.99 * grown).margin == margin
+        assert now.after_experiment(EXPERIMENTS[name](800.0), 0.02, 1.01 * grown) is None
+        assert now.after_experiment(EXPERIMENTS[name](800.0), 0.02, 0.99 * grown).margin == margin
     for name in ("steps", "idle"):  # whatever the rival were fitted to, it cannot miss more than it does as it is
-        before = Contest(lag, lag, now.without).after(EXPERIMENTS[name](800.0), 0.02, 1.0)
+        before = Contest(lag, lag, now.without).after_experiment(EXPERIMENTS[name](800.0), 0.02, 1.0)
         assert before is None
     for made in EXPERIMENTS.values():  # what is passed over by its bound would not have come as far
-        then = now.after(made(800.0), 0.02)
-        assert now.after(made(800.0), 0.02, of_use=0.999 * then.log_odds) is not None
+        then = now.after_experiment(made(800.0), 0.02)
+        assert now.after_experiment(made(800.0), 0.02, min_log_odds=0.999 * then.log_odds) is not None
     alike = Contest(lag, fit(likelihood, lag.model.with_part(effect("zero_drift")), 1), now.without)
     for made in EXPERIMENTS.values():
-        most = alike.after(made(800.0), 0.02).log_odds
-        assert alike.after(made(800.0), 0.02, of_use=1.0) is None
+        most = alike.after_experiment(made(800.0), 0.02).log_odds
+        assert alike.after_experiment(made(800.0), 0.02, min_log_odds=1.0) is None
         assert most < 1.0
 
 

@@ -24,7 +24,7 @@ from smartshoe.diagnosis._lack_of_fit import (
     LackOfFit,
     _loudness,
     _mean_variance,
-    _quiet,
+    _quiet_blocks,
     repeating,
     repeats,
     slow,
@@ -250,10 +250,10 @@ def test_a_score_is_significant_beyond_students_quantile(pairs: int) -> None:
 def test_structure_would_show_where_its_variance_is_beyond_students_quantile_of_noise(pairs: int) -> None:
     bound = float(student.isf(0.5 * STANDARD.false_alarm, pairs - 1))
     one = LackOfFit(0.0, 0.0, pairs, STANDARD, 1e-6)
-    assert not one.would_show(0.999e-3 * bound**0.5)
-    assert one.would_show(1.001e-3 * bound**0.5)
-    assert not replace(one, pairs=1).would_show(9.0)
-    assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_show(9.0)
+    assert not one.would_detect(0.999e-3 * bound**0.5)
+    assert one.would_detect(1.001e-3 * bound**0.5)
+    assert not replace(one, pairs=1).would_detect(9.0)
+    assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_detect(9.0)
 
 
 def test_what_a_test_would_show_is_what_it_finds_significant() -> None:
@@ -265,7 +265,7 @@ def test_what_a_test_would_show_is_what_it_finds_significant() -> None:
     least = np.sqrt(float(student.isf(0.5 * STANDARD.false_alarm, found.pairs - 1)) * found.variance_sd)
     bow = load * (1.0 - load)
     bow *= 1.5 * least / np.sqrt(np.mean(bow**2))
-    assert found.would_show(1.5 * least)
+    assert found.would_detect(1.5 * least)
     assert repeating([_session(load, cycle)], [noise + bow], STANDARD).significant
 
 
@@ -394,7 +394,7 @@ def test_four_blocks_tell_nothing_and_five_do() -> None:
 def test_the_quiet_are_the_nine_tenths_with_the_least_power_about_their_mean() -> None:
     rows = np.array([[0.0, size, 0.0, -size] for size in (3.0, 1.0, 9.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 1.5)])
     rows[1] += 100.0
-    assert list(np.flatnonzero(~_quiet(rows))) == [2]
+    assert list(np.flatnonzero(~_quiet_blocks(rows))) == [2]
 
 
 def test_how_loud_a_block_is_goes_by_its_neighbours_differences_but_one_jump() -> None:
