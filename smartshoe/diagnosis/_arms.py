@@ -9,7 +9,7 @@ from smartshoe.diagnosis._baseline import USUAL, has_arm_beyond_memory, with_usu
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, fit
 from smartshoe.diagnosis._members import start_with
 from smartshoe.diagnosis._search import BREADTH, SWAPS, best_additions
-from smartshoe.diagnosis._sensitivity import available
+from smartshoe.diagnosis._sensitivity import available_effects
 from smartshoe.diagnosis._state import State, linearised_search, state_at, with_members
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
@@ -36,7 +36,7 @@ def latency_with_usual_arm(state: State) -> Fit:
     """
     likelihood = state.likelihood()
     bare = with_usual_arm(state.fit.model)
-    effects = available(likelihood.sessions, state.thresholds)
+    effects = available_effects(likelihood.sessions, state.thresholds)
     late = [one for one in effects if one.is_latency and one.name not in bare.names]
     return min((fit(likelihood, start_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost)
 
@@ -62,7 +62,7 @@ def with_creeping_arm(state: State) -> State:
     model, bare = state.fit.model, _without_core_effects(state.fit.model)
     arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(model))]
     starts = creeping = [with_arm(bare, arm) for arm in arms]
-    for effect in available(state.linearisation.sessions, state.thresholds):
+    for effect in available_effects(state.linearisation.sessions, state.thresholds):
         values = effect.falling_at(model.pole_per_s, model.wall_ratio)
         if values is not None and effect.name not in bare.names:
             starts = [*starts, *(one.with_part(effect, values) for one in creeping)]

@@ -34,11 +34,11 @@ def cause_of(
     member = name.member
     law = name.law_in_place or next((a for a in member.laws if a.effect == name.effect.name), None)
     without = member.without.model.held_as(found.fit.model)
-    won = gain(errors(fine, without), best, scale, thresholds)
+    gained = gain(errors(fine, without), best, scale, thresholds)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
         _without_it(name),
-        *_held_out_evidence(member.size, won, thresholds.material),
+        *_held_out_evidence(member.size, gained, thresholds.material),
         *_against(rivals, name.equivalents),
         *_how_sure(name, law, rivals, found, thresholds),
         *_missed_by(law, name, thresholds),
@@ -47,7 +47,7 @@ def cause_of(
     by = None if law is None else law.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
     sure = confidence_of(name, thresholds), name.law_probability
-    return Cause(name.effect, *sure, name.equivalents, values, evidence, won, member.size, rivals, member.name)
+    return Cause(name.effect, *sure, name.equivalents, values, evidence, gained, member.size, rivals, member.name)
 
 
 def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
@@ -118,7 +118,7 @@ def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> l
     """How much of a flexible block the law that names it misses."""
     if law is None:
         return []
-    missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # of -2 log likelihood
+    missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # a share of the fall of -2 log likelihood
     most = 100 * thresholds.departure**2
     much = "no more" if missed <= most else "more"
     says = (
@@ -138,7 +138,7 @@ def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
     return [Statement("what would show it best is missing", float(len(lacking)), 0.0, says)]
 
 
-def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:
+def _held_out_evidence(size: float, gained: Gain, material: float) -> list[Statement]:
     """The effect's size and its gain on held-out data; ``size`` and ``material`` are shares of full scale."""
     moves = Statement(
         "size in percent of full scale",
@@ -146,16 +146,17 @@ def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statemen
         100 * material,
         f"it moves the reading by {100 * size:.3g} % of full scale",
     )
-    if math.isnan(won.gain_percent):
+    if math.isnan(gained.gain_percent):
         return [moves]
-    way = "falls" if won.rmse_after <= won.rmse_before else "rises"
+    way = "falls" if gained.rmse_after <= gained.rmse_before else "rises"
     return [
         moves,
         Statement(
             "gain on held-out data in percent",
-            won.gain_percent,
+            gained.gain_percent,
             0.0,
-            f"on data not fitted the error {way} from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+            f"on data not fitted the error {way} from {gained.rmse_before:.4g} to {gained.rmse_after:.4g}"
+            f" {gained.unit}",
         ),
     ]
 
@@ -164,7 +165,7 @@ def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds
     """The cause for an offset or tare: without it every reading is off, if it ``is_of_all`` recordings."""
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
     nothing = Errors(best.squares[:0], best.counts[:0], math.nan)
-    won = gain(worse if is_of_all else nothing, best, scale, thresholds)
+    gained = gain(worse if is_of_all else nothing, best, scale, thresholds)
     parameter = zero.effect.parameters[0]
     factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
     interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
@@ -180,5 +181,5 @@ def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds
         1.0 - thresholds.false_name if zero.is_seen else thresholds.least_confidence,  # or seen by the model only
         1.0 / (1.0 + len(zero.alternatives)),
     )
-    evidence = (seen, *_held_out_evidence(zero.size, won, thresholds.material))
-    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
+    evidence = (seen, *_held_out_evidence(zero.size, gained, thresholds.material))
+    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, gained, zero.size)

@@ -111,7 +111,7 @@ def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:
     return _friction(found, thresholds)
 
 
-def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
+def _is_reproducible(recording: Recording, thresholds: Thresholds) -> bool:
     """Whether the branches of each half explain the other half, which chance branches would not."""
     middle_s = 0.5 * float(recording.time_s[0] + recording.time_s[-1])
     ends_s = (float(recording.time_s[0]), middle_s, float(recording.time_s[-1]))
@@ -158,7 +158,7 @@ def _line_of(columns: Array, strokes: _Strokes) -> Array:
 
 
 def _friction(found: Branches, thresholds: Thresholds) -> str | None:
-    if not _comes_back(found.recording, thresholds) or _fades(found, thresholds):
+    if not _is_reproducible(found.recording, thresholds) or _fades(found, thresholds):
         return None
     sensor = found.recording.sensor
     half = 0.5 * found.separation

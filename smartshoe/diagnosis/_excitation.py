@@ -125,8 +125,8 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     rested = [(_rested(one, thresholds), one.conditions.step_s) for one in sessions]
     rest_s = max((_longest_read_s(one, mask) for one, (mask, _) in zip(sessions, rested, strict=True)), default=0.0)
     # What a unit does at rest shows afterwards, even if nothing is read meanwhile.
-    idle_s = max((n * step_s for mask, step_s in rested for n in _runs(mask)), default=0.0)
-    pauses = [n * step_s for mask, step_s in rested for n in _runs(_within(mask))]
+    idle_s = max((n * step_s for mask, step_s in rested for n in _run_lengths(mask)), default=0.0)
+    pauses = [n * step_s for mask, step_s in rested for n in _run_lengths(_inner_runs(mask))]
     # The ends of a ramp are smeared by the filter's window, and known to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
@@ -222,7 +222,7 @@ def _still(session: Session, thresholds: Thresholds) -> Mask:
     return np.asarray(np.abs(after - before) < thresholds.still_per_s * width * conditions.step_s + noise)
 
 
-def stays(session: Session, thresholds: Thresholds) -> Mask:
+def stays_still(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True in runs of a ``few`` logged samples within which the load stays within ``standing``.
 
     A load that changes at random from sample to sample is slow here and there, but never held. Where a few samples last
@@ -247,7 +247,7 @@ def _turning_s(thresholds: Thresholds) -> float:
 def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
     is_borne = ~session.resting & (session.conditions.load > thresholds.cycle)
-    return np.asarray(_still(session, thresholds) & stays(session, thresholds) & is_borne)
+    return np.asarray(_still(session, thresholds) & stays_still(session, thresholds) & is_borne)
 
 
 def _rested(session: Session, thresholds: Thresholds) -> Mask:
@@ -255,7 +255,7 @@ def _rested(session: Session, thresholds: Thresholds) -> Mask:
     return np.asarray(_still(session, thresholds) & session.resting)
 
 
-def _within(mask: Mask) -> Mask:
+def _inner_runs(mask: Mask) -> Mask:
     """(n,) ``mask`` without the runs that begin or end the recording."""
     other = np.flatnonzero(~mask)
     inner = np.zeros_like(mask)
@@ -264,7 +264,7 @@ def _within(mask: Mask) -> Mask:
     return inner
 
 
-def _runs(mask: Mask) -> list[int]:
+def _run_lengths(mask: Mask) -> list[int]:
     first, last = runs_of(mask)
     return [int(n) for n in last - first]
 

@@ -30,7 +30,7 @@ class ForceError:
 
 def force_error(fine: Sequence[Session], model: ExtendedModel) -> ForceError:
     """The errors of ``model`` inverted, over fitted and over held-out samples."""
-    off = [_off_n(one, model) for one in fine]
+    off = [_force_error_n(one, model) for one in fine]
     return ForceError(_rms(off, [one.fitted for one in fine]), _rms(off, [one.judged for one in fine]))
 
 
@@ -194,10 +194,15 @@ def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[s
     """
     model, there = found.model, [one for one in found.fine if one.usable.any()]
     scale_n = model.full_scale_load_n
-    off_n = [_rms([_off_by_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there]
+    off_n = [
+        _rms([_error_without_own_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there
+    ]
     worst = max(range(len(there)), key=off_n.__getitem__)
     worst_n, name = off_n[worst], there[worst].recording.name
-    stated_n, least_n = _rms([_off_n(there[worst], model)], [there[worst].usable]), thresholds.tolerable * scale_n
+    stated_n, least_n = (
+        _rms([_force_error_n(there[worst], model)], [there[worst].usable]),
+        thresholds.tolerable * scale_n,
+    )
     if worst_n <= thresholds.clear * max(stated_n, least_n):
         held_n = found.error.held_out_n
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
@@ -213,7 +218,7 @@ def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[s
     ]
 
 
-def _off_n(session: Session, model: ExtendedModel) -> Array:
+def _force_error_n(session: Session, model: ExtendedModel) -> Array:
     """(n,) compensated force less load in N, with the recording's own offset and past removed from the reading.
 
     The past includes what earlier recordings, which it continues, did to the unit; their clock runs on, and a
@@ -227,14 +232,16 @@ def _off_n(session: Session, model: ExtendedModel) -> Array:
     if session.conditions.before:
         rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
         own = own + read - undone.simulate(rested)
-    return _off_by_n(session, model, compensator, own)
+    return _error_without_own_n(session, model, compensator, own)
 
 
 def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:
     return ExtendedCompensator(model, 1.0 / session.conditions.step_s, started_s=started_s)
 
 
-def _off_by_n(session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float) -> Array:
+def _error_without_own_n(
+    session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float
+) -> Array:
     """(n,) compensated force less load in N, for a reading without its ``own`` terms, shares of full scale."""
     force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
     return np.asarray(force_n - session.conditions.load * model.full_scale_load_n)

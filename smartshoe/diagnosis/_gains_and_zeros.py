@@ -20,7 +20,7 @@ from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import gains_and_zero_changes, own_terms_of, residual_of
 from smartshoe.diagnosis._jumps import any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._search import backward_eliminated, search
 from smartshoe.diagnosis._session import Session, fitted_of
@@ -74,7 +74,7 @@ class _OwnTerms:
     def of(cls, state: State, sessions: Sequence[Session], noise_sd: float) -> _OwnTerms:
         """The effects of ``state`` that remain when the sessions have their own terms."""
         evidence = Evidence(replace(state.linearisation, sessions=fitted_of(sessions)), noise_sd)
-        return cls(sessions, evidence, backward_eliminated(evidence, state.start))
+        return cls(sessions, evidence, backward_eliminated(evidence, state.fitted_members))
 
     @property
     def odds_of_a_change(self) -> float:
@@ -123,7 +123,7 @@ def with_own_terms(state: State, sessions: Sequence[Session]) -> Sequence[Sessio
     rivals: list[_OwnTerms] = []
     by_gain = None
     if len(fitted_of(sessions)) > 1:
-        found = _OwnTerms(sessions, state.evidence, state.start)
+        found = _OwnTerms(sessions, state.evidence, state.fitted_members)
         own_gain_sd = state.thresholds.strength_sd
         with_own = _OwnTerms.of(
             state, [replace(one, own_gain_sd=own_gain_sd) for one in sessions], found.evidence.noise_sd
@@ -147,7 +147,7 @@ def _with_jumping_zeros(state: State, sessions: Sequence[Session], rivals: Seque
     if _excess_rms(state.fit.model, sessions, state.thresholds) <= state.thresholds.tolerable:
         return None  # nothing is left for a jumping zero to explain
     noise_sd = _between_moments_sd(state, sessions)
-    found = _OwnTerms(sessions, Evidence(state.evidence.linearisation, noise_sd), state.start)
+    found = _OwnTerms(sessions, Evidence(state.evidence.linearisation, noise_sd), state.fitted_members)
     jumping = with_changes(state, found, of_zero=True)
     if jumping is found or not are_supported(state, found.searched(), jumping := jumping.searched()):
         return None
@@ -159,7 +159,7 @@ def _with_jumping_zeros(state: State, sessions: Sequence[Session], rivals: Seque
 
 
 def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
-    """Standard deviation of the noise, as in `correlated_sd`, about a free mean between each two moments."""
+    """Standard deviation of the noise, as in `effective_noise_sd`, about a free mean between each two moments."""
     left, kept, free = [], [], 0  # degrees of freedom of all samples
     for one in fitted_of(sessions):
         residual = residual_of(one, state.fit.model)
@@ -170,7 +170,7 @@ def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
         kept.append(one.fitted)
         free += int(one.fitted.sum()) - int(np.count_nonzero(counts))
     count = sum(int(one.sum()) for one in kept)
-    return min(correlated_sd(left, kept) * math.sqrt(count / max(free, 1)), state.evidence.noise_sd)
+    return min(effective_noise_sd(left, kept) * math.sqrt(count / max(free, 1)), state.evidence.noise_sd)
 
 
 def may_differ(state: State, sessions: Sequence[Session]) -> bool:
@@ -265,7 +265,7 @@ def are_supported(state: State, found: _OwnTerms, with_own: _OwnTerms) -> bool:
     if not is_simpler and thresholds.clear * after**2 > before**2:
         return False
     before, after = (
-        float(LeftOut(some, with_own.evidence.noise_sd, one, thresholds, is_apart=True).errors(one).sum())
+        float(LeftOut(some, with_own.evidence.noise_sd, one, thresholds, by_recording=True).errors(one).sum())
         for some, one in ((sessions, without), (with_own.sessions, model))
     )
     return thresholds.clear * after <= before
@@ -282,7 +282,9 @@ def predicts_better(
     """
     if not any(one.gain_changes or one.zero_changes for one in with_own):
         return error_of(sessions, model) < error_of(sessions, plain)
-    return LeftOut(sessions, state.evidence.noise_sd, model, state.thresholds, is_apart=True).is_validated(model, plain)
+    return LeftOut(sessions, state.evidence.noise_sd, model, state.thresholds, by_recording=True).is_validated(
+        model, plain
+    )
 
 
 def gains_of(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> tuple[OwnGain, ...]:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import nuisance_diagonal, nuisances, past_sd
 from smartshoe.diagnosis._session import Session
@@ -49,7 +49,7 @@ def own_terms_of(session: Session, model: ExtendedModel, residual: Array) -> tup
     found = solved_with(float(np.var(residual[mask])) if mask.any() else 0.0, largest_state)
     if session.judged[: int(np.argmax(mask))].any():
         left = residual - columns @ found
-        found = solved_with(correlated_sd([left], [mask]) ** 2, past_sd(session, model))
+        found = solved_with(effective_noise_sd([left], [mask]) ** 2, past_sd(session, model))
     return found, columns @ found
 
 
@@ -61,7 +61,7 @@ def initial_memory_of(session: Session, model: ExtendedModel, residual: Array) -
     mask = session.fitted
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
     left = residual - own_terms_of(session, model, residual)[1]
-    variance = correlated_sd([left], [mask]) ** 2
+    variance = effective_noise_sd([left], [mask]) ** 2
     known = variance / past_sd(session, model) ** 2
     prior = nuisance_diagonal(session, offset=0.0, past=known, change=variance, gap=variance) + 1e-9 * np.eye(
         columns.shape[1]

@@ -31,7 +31,7 @@ from smartshoe.diagnosis._laws import likelier_changes, with_laws
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit
 from smartshoe.diagnosis._members import Member, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
@@ -63,7 +63,7 @@ class Inference:
     ``cancelling_names`` are members that cancel one another, so that none of them is named.
 
     ``best_single`` is the effect that predicts left-out data best on its own; it is sought only where no member is
-    sure. ``nearest`` is sought only where there is no member: a law that alone follows most of what the baseline
+    sure. ``nearest_law`` is sought only where there is no member: a law that alone follows most of what the baseline
     misses, with the rms of the residual without it and with it, shares of full scale.
 
     ``own_gains`` are the gains of the recordings where they differ, ``zero_changes`` the moments at which their zeros
@@ -79,12 +79,12 @@ class Inference:
     can_validate: bool = True
     cancelling_names: tuple[str, ...] = ()
     best_single: Effect | None = None
-    nearest: tuple[Effect, float, float] | None = None
+    nearest_law: tuple[Effect, float, float] | None = None
     own_gains: tuple[OwnGain, ...] = ()
     zero_changes: tuple[ZeroChange, ...] = ()
 
 
-def inferred(
+def infer_with_gas_check(
     start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
 ) -> Inference:
     """`infer`, repeated without gas effects where the reading is no pressure but a gas effect relaxes most.
@@ -141,7 +141,7 @@ def infer(
         other = _validated(with_blocks, plain, sessions)
         if not other.is_reduced and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
-    found, members = _refined(found, plain, sessions, progress)
+    found, members = _best_by_single_changes(found, plain, sessions, progress)
     if found.is_reduced:
         found = found.reduced_to(plain)
         members = found.members()
@@ -154,7 +154,7 @@ def infer(
         if best_single_fit is not None and len(found.fit.model.parts) == len(plain.model.parts):
             found = best_single_fit[1]
             members, refused = found.members(), tuple(name for name in refused if name not in found.fit.model.names)
-    nearest = None if members else _nearest_single_law(initial, plain, sessions)
+    nearest_law = None if members else _nearest_single_law(initial, plain, sessions)
     return Inference(
         plain,
         found.fit,
@@ -164,7 +164,7 @@ def infer(
         refused,
         cancelling_names=found.cancelling_names,
         best_single=best_single,
-        nearest=nearest,
+        nearest_law=nearest_law,
     )
 
 
@@ -283,7 +283,7 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     return _Validated(evidence, best, extended, tuple(refused), cancelling_left, is_reduced)
 
 
-def _refined(
+def _best_by_single_changes(
     found: _Validated, plain: Fit, sessions: Sequence[Session], progress: Progress
 ) -> tuple[_Validated, tuple[Member, ...]]:
     """The best set that changes of one member or one law reach from ``found``, and its members."""
@@ -349,9 +349,9 @@ def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tup
         return None
     left_out = LeftOut(sessions, initial.evidence.noise_sd, plain.model, thresholds)
     likelihood, standing = initial.likelihood(), []
-    nothing = initial.evidence.posterior(initial.start)
-    for k in best_additions(initial.evidence, initial.start, BREADTH):
-        best = initial.evidence.posterior((*initial.start, k))
+    nothing = initial.evidence.posterior(initial.fitted_members)
+    for k in best_additions(initial.evidence, initial.fitted_members, BREADTH):
+        best = initial.evidence.posterior((*initial.fitted_members, k))
         if best.score >= nothing.score:
             continue
         one = State(initial.evidence, best, fit_of_set(initial, best, likelihood))
@@ -372,10 +372,12 @@ def _nearest_single_law(initial: State, plain: Fit, sessions: Sequence[Session])
     if before <= thresholds.tolerable:
         return None
     likelihood, remaining = initial.likelihood(), []
-    for k in best_additions(initial.evidence, initial.start, 2 * BREADTH):
+    for k in best_additions(initial.evidence, initial.fitted_members, 2 * BREADTH):
         one = initial.linearisation.candidates[k]
         if not one.effect.is_flexible:
-            fitted = fit_of_set(initial, initial.evidence.posterior((*initial.start, k)), likelihood, FEW_STEPS)
+            fitted = fit_of_set(
+                initial, initial.evidence.posterior((*initial.fitted_members, k)), likelihood, FEW_STEPS
+            )
             remaining.append((error_of(sessions, fitted.model), one.effect))
     least, effect = min(remaining, key=lambda pair: pair[0], default=(before, None))
     return (effect, before, least) if effect is not None and thresholds.clear * least**2 <= before**2 else None
@@ -384,7 +386,7 @@ def _nearest_single_law(initial: State, plain: Fit, sessions: Sequence[Session])
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
     """The best predictor of the form of ``start``: output error, with noise counted once per correlation time."""
     residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
-    return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start)
+    return fit(Likelihood(sessions, effective_noise_sd(residuals, kept), start, thresholds), start)
 
 
 def independent_count(sessions: Sequence[Session], thresholds: Thresholds) -> int:

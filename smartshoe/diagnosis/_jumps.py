@@ -59,10 +59,10 @@ def any_jumps(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thr
     """
     fitted = fitted_of(sessions)
     places = sum(moments_of(one, thresholds).size for one in fitted)
-    return any(_jumps(one, model, places, thresholds) for one in fitted if one.zero_changes)
+    return any(_has_jump(one, model, places, thresholds) for one in fitted if one.zero_changes)
 
 
-def _jumps(session: Session, model: ExtendedModel, places: int, thresholds: Thresholds) -> bool:
+def _has_jump(session: Session, model: ExtendedModel, places: int, thresholds: Thresholds) -> bool:
     """Whether a change is abrupt, exceeds noise at any of ``places`` moments, and recurs at a load from before.
 
     The residual also changes between other moments, which gives its usual change and their number the degrees of
@@ -79,7 +79,7 @@ def _jumps(session: Session, model: ExtendedModel, places: int, thresholds: Thre
     for k, (at, share) in enumerate(zip(session.zero_changes, shares, strict=True)):
         seen = float(share + moved[at])
         if abs(seen) > most and _is_alike(seen, share, thresholds):
-            again = _at_like_loads(session, left, at, slice(ends[k], ends[k + 2]), thresholds)
+            again = _change_at_equal_loads(session, left, at, slice(ends[k], ends[k + 2]), thresholds)
             if again is not None and _is_alike(share + again, share, thresholds):
                 return True
     return False
@@ -112,7 +112,7 @@ def _mean_steps(session: Session, left: Array, thresholds: Thresholds) -> Array:
     return np.where((earlier > 0) & (later > 0), moved, 0.0)
 
 
-def _at_like_loads(session: Session, left: Array, at: int, part: slice, thresholds: Thresholds) -> float | None:
+def _change_at_equal_loads(session: Session, left: Array, at: int, part: slice, thresholds: Thresholds) -> float | None:
     """By how much ``left`` differs after a sample from before, within ``part``, at equal load and direction of motion.
 
     A jump moves the reading equally at each load; a curve acts only at new loads, and a loop only as the load turns.

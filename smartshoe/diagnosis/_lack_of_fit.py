@@ -57,7 +57,7 @@ class LackOfFit:
         return -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
 
 
-def repeating(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
+def repeating_structure(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
     """Structure that repeats from load cycle to load cycle: its power in each kind of cycle, over the record."""
     power = variance = 0.0
     pairs = 0
@@ -162,7 +162,7 @@ class _LoadCycle(NamedTuple):
         return float(np.std(self.course - other.course)) <= alike * float(np.std(other.course))
 
 
-def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
+def slow_structure(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
     """Structure in the means of blocks of ``lasting_s``, beyond what noise of the faster part would leave there."""
     excess: list[float] = []
     spread = 0.0

@@ -8,7 +8,7 @@ from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit
 from smartshoe.diagnosis._members import Alternative, Member, fit_with
 from smartshoe.diagnosis._search import RIVALS, SWAPS, has_physical_sign
-from smartshoe.diagnosis._sensitivity import Candidate, available
+from smartshoe.diagnosis._sensitivity import Candidate, available_effects
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, state_at
 from smartshoe.models.effects import Effect, blocks
 from smartshoe.models.extended import ExtendedModel
@@ -136,7 +136,7 @@ def _law_of(
     flexible = evaluated(likelihood, about).cost
     explained = min(nothing.cost, likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
-    for law in available(likelihood.sessions, thresholds):
+    for law in available_effects(likelihood.sessions, thresholds):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
             continue
         # A law that is already beside the block may do without it.

@@ -37,17 +37,17 @@ SAID = 4  # of many changes of a gain, or other such items, how many are listed
 
 
 def limit_clocks_disagree(
-    told: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
+    clocks: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
 ) -> str | None:
     """The sentence where the fit's lag between clocks differs from the one that the edges showed; None otherwise.
 
-    The lag is that of all that makes the model late, in the middle of the fitted time. ``told`` are the effects, with
+    The lag is that of all that makes the model late, in the middle of the fitted time. ``clocks`` are the effects, with
     values, by the edges.
     """
-    if not {one.name for one, _ in told} & {*model.names}:
+    if not {one.name for one, _ in clocks} & {*model.names}:
         return None
     middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in fitted_of(sessions)]))
-    lag_s = sum(one.late_s(values, middle_s) for one, values in told)
+    lag_s = sum(one.late_s(values, middle_s) for one, values in clocks)
     fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
         return None
@@ -205,7 +205,7 @@ def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], threshol
     """The sentence on a leak, or heat, where the stiffness of the wall relative to the gas is not known."""
     units = {one.recording.sensor.unit.quantity for one in sessions}
     is_of_gas = any(part.effect.stage == "gas" for part in model.parts) and units.isdisjoint(NON_PRESSURES)
-    if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # one is known
+    if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # the ratio is known
         return None
     softest, stiffest = PAPER_WALL_RATIOS
     gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]
@@ -223,15 +223,15 @@ def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], threshol
     )
 
 
-def limit_rejected(won: Gain, beyond: str | None) -> str:
+def limit_rejected(gained: Gain, beyond: str | None) -> str:
     """The sentence on an extension that is rejected; ``beyond``: how held-out loads exceed the fitted ones."""
-    low, high = won.ci95
+    low, high = gained.ci95
     least, most = (percent(-0.01 * bound) for bound in (high, low))
-    by = f"by {least.removesuffix(' %')} to {most}" if won.is_certain else "which may be chance"
+    by = f"by {least.removesuffix(' %')} to {most}" if gained.is_certain else "which may be chance"
     why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
     return (
-        f"on held-out data the extended model is worse than the baseline ({won.rmse_before:.4g} to"
-        f" {won.rmse_after:.4g} {won.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
+        f"on held-out data the extended model is worse than the baseline ({gained.rmse_before:.4g} to"
+        f" {gained.rmse_after:.4g} {gained.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
         " baseline's until such a recording is among those that are fitted"
     )
 
@@ -365,9 +365,9 @@ def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
 
 def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
     """The sentence on a law that follows most of what the baseline misses and is not named."""
-    if found.nearest is None:
+    if found.nearest_law is None:
         return []
-    effect, left, beside = found.nearest
+    effect, left, beside = found.nearest_law
     return [
         f"{in_words(effect.name)} alone follows most of what the baseline misses ({percent(left)} of full scale"
         f" where it was fitted, {percent(beside)} with it), and so may small imperfections of many kinds,"

@@ -14,7 +14,7 @@ from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
 from smartshoe.diagnosis._search import BREADTH, RIVALS, best_additions, is_admissible
-from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
+from smartshoe.diagnosis._sensitivity import Candidate, available_effects, cosines, logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Effect, blocks, catalogue, told_apart_by
 from smartshoe.models.extended import ExtendedModel
@@ -88,8 +88,8 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
         fit(likelihood, _without(one.name, extended.model, is_at_end_of_kind=at_end), FEW_STEPS)
         for one, at_end in zip(chosen, ended, strict=True)
     ]
-    whole = _left(likelihood, extended)
-    added = np.array([_left(likelihood, one) - whole for one in reduced]).reshape(len(reduced), whole.size)
+    whole = _residuals(likelihood, extended)
+    added = np.array([_residuals(likelihood, one) - whole for one in reduced]).reshape(len(reduced), whole.size)
     inner = added @ added.T
     sizes = np.sqrt(np.diag(inner) / max(whole.size, 1))
     likeness = cosines(inner)
@@ -115,14 +115,14 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
                 ended[k],
-                tuple(_of_kind(law, reduced[k], extended) for law in rivals) if is_there else (),
+                tuple(_confounded_fit(law, reduced[k], extended) for law in rivals) if is_there else (),
                 extended.model.part(one.name).bends_too_little,
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))
 
 
-def _left(likelihood: Likelihood, found: Fit) -> Array:
+def _residuals(likelihood: Likelihood, found: Fit) -> Array:
     """(n,) residuals of all fitted samples, without each recording's own offset."""
     return np.concatenate([residual_of(one, found.model)[one.fitted] for one in likelihood.sessions])
 
@@ -170,7 +170,7 @@ def _other_laws(
     """The other laws of a member's family, each fitted in its place, nearest first; for a generic curve all curves."""
     likelihood, of_curves = reduced.likelihood, _is_any_curve(one.effect, is_at_end_of_kind)
     base, found = _without(one.name, extended.model, is_at_end_of_kind=is_at_end_of_kind), []
-    for law in available(likelihood.sessions, likelihood.thresholds):
+    for law in available_effects(likelihood.sessions, likelihood.thresholds):
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if law.is_flexible or not is_other or law.name in (one.name, *reduced.model.names):
             continue
@@ -200,7 +200,7 @@ def _confounded_law(other: Alternative, one: Effect, present: frozenset[str]) ->
     return law if words and not words & present else None
 
 
-def _of_kind(law: Effect, reduced: Fit, extended: Fit) -> Alternative:
+def _confounded_fit(law: Effect, reduced: Fit, extended: Fit) -> Alternative:
     """A law in a member's place, or the flexible block of its branch if that follows better, fitted to convergence."""
     free = (one for one in blocks().get(law.family, ()) if one.branch == law.branch)
     fits = [fit_with(one, reduced.model, reduced.likelihood) for one in (law, *free)]

@@ -102,7 +102,7 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
     if law_in_place is not None and law_in_place.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: its rivals are compared with that law.
         followed = catalogue()[str(law_in_place.effect)]
-        kin = _kin_of(followed) or tuple(
+        kin = _other_laws_of_family(followed) or tuple(
             str(a.effect) for a in one.laws if a is not law_in_place
         )  # of a curve all other curves
         beside = tuple(replace(a, margin=a.margin - law_in_place.margin) for a in one.laws if a.effect in kin)
@@ -112,7 +112,9 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if law_in_place is None else catalogue()[str(law_in_place.effect)]
-    others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve all other curves
+    others = dict.fromkeys(
+        (*_other_laws_of_family(nearest), *(str(a.effect) for a in one.laws))
+    )  # of a curve all other curves
     others.pop(nearest.name, None)
     # A law that follows less than half of it is no equivalent.
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
@@ -146,7 +148,7 @@ def _law_in_its_place(one: Member) -> Alternative | None:
     return next((a for a in one.laws if a.effect == nearest), None)
 
 
-def _kin_of(law: Effect) -> tuple[str, ...]:
+def _other_laws_of_family(law: Effect) -> tuple[str, ...]:
     """The other laws of a law's family, and those that count as its members."""
     return tuple(one.name for one in catalogue().values() if one.kind == law.kind and one is not law)
 

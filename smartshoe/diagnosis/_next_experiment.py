@@ -84,7 +84,7 @@ def next_experiment(
     zeros = [cause for cause in causes if cause.equivalents and cause.part is None]
     is_unsure = any(cause.confidence < least for cause in causes)
     if open_ or is_unsure or not all(effect(one.name).exposed_by <= excitation.present for one in zeros):
-        unseen = _protocol_of_what_is_lacking(found, pair, excitation, _least_step_s(sessions))
+        unseen = _protocol_for_missing_excitation(found, pair, excitation, _least_step_s(sessions))
         return _with_its_loads(unseen, sessions, excitation.thresholds)
     by_reference = (_by_reference(zero, sessions) for zero in zeros)
     return next((one for one in by_reference if one is not None), proposed[0] if proposed else None)
@@ -154,8 +154,8 @@ def _separating_experiment(
         instead = "use either for loads like those recorded, under which they read too nearly alike"
         if len(lost) == 1:
             why = effect(lost[0]).why_not_undone
-            stays = f"the {in_words(lost[0])} stays in the force, since {why}"
-            instead = f"under loads like those recorded they read too nearly alike, but {stays}"
+            stays_still = f"the {in_words(lost[0])} stays in the force, since {why}"
+            instead = f"under loads like those recorded they read too nearly alike, but {stays_still}"
         if word is not None:
             instead = f"what would is {SAYS[word]}"
         says = f"{no_use}: {instead}"
@@ -251,7 +251,7 @@ def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:
     return next(((cause.name, *names) for cause, names in others if names), ())
 
 
-def _protocol_of_what_is_lacking(
+def _protocol_for_missing_excitation(
     found: Inference, names: tuple[str, ...], excitation: Excitation, sample_time_s: float
 ) -> NextExperiment:
     """The first protocol that shows what this data lacks, or a repetition where it lacks nothing.

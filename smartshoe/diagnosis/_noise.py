@@ -13,7 +13,7 @@ ROUNDING = 1e-9  # share of full scale: rounding, which remains where nothing el
 FLOOR = 1e-6  # share of full scale: no sensor is better, and with less noise rounding would decide
 
 
-def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
+def effective_noise_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
     """Standard deviation of white noise that carries as much information as ``residuals`` (n,) where ``kept``.
 
     Least squares is the best predictor where the residual is an error of the model. Correlated samples repeat one

@@ -21,8 +21,8 @@ from smartshoe.diagnosis._force import (
     limit_not_undone,
 )
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_terms_of, residual_of
-from smartshoe.diagnosis._inference import Inference, inferred
-from smartshoe.diagnosis._lack_of_fit import repeating
+from smartshoe.diagnosis._inference import Inference, infer_with_gas_check
+from smartshoe.diagnosis._lack_of_fit import repeating_structure
 from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._limits import (
     SAID,
@@ -59,7 +59,7 @@ from smartshoe.diagnosis._verdict import (
     untested_rms,
     verdict_of,
 )
-from smartshoe.diagnosis._withheld import Chosen, causes_among
+from smartshoe.diagnosis._withheld import NamedCauses, causes_among
 from smartshoe.diagnosis._zero import OwnZeros, Zero, mean_offset, own_zeros, zeros_of
 from smartshoe.integrity import DataFault, Integrity
 from smartshoe.integrity.thresholds import Thresholds
@@ -77,10 +77,10 @@ def diagnosed(
     """The diagnosis of ``recordings``; the first ``count`` are fitted, the others are held out."""
     given = prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
-    found = inferred(given.start, sessions, thresholds, progress, not given.is_no_unit)
+    found = infer_with_gas_check(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     left = _residuals_of(found, given, integrity.faults)
-    named = _named(found, given, left)
+    named = _named_causes(found, given, left)
     held = _with_held_drifts(found.fit.model, named, sessions)
     if held is not found.fit.model:  # the fit, and what the names rest on, stay as they were
         found = replace(found, fit=replace(found.fit, model=held))
@@ -94,10 +94,12 @@ def diagnosed(
     own_zero_offsets = None if is_told else own_zeros(sessions, found.fit.model, thresholds)
     causes += [zero_cause_of(zero, best, scale, thresholds, own_zero_offsets is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
-    won = gain(baseline, best, scale, thresholds)
-    outcome = _outcome(found, given, left, named, causes, won)
+    gained = gain(baseline, best, scale, thresholds)
+    outcome = _outcome(found, given, left, named, causes, gained)
     adopted = _Adopted(found.fit, extended, best, left.after)
-    if won.is_rejected:  # the only decision that held-out data makes: an extension that is worse there is not adopted
+    if (
+        gained.is_rejected
+    ):  # the only decision that held-out data makes: an extension that is worse there is not adopted
         adopted = _Adopted(found.baseline, plain, baseline, left.before)
     verdict, rest = outcome.verdict, unexplained_of(causes, left.before, adopted.left)
     of_held_out = held_out_rms(fine, left.residuals_after, thresholds)
@@ -123,11 +125,11 @@ def diagnosed(
         names_in(causes, len(minor)),
         baseline,
         best,
-        unexplained_remark(rest, 0.0 if won.is_rejected else outcome.elsewhere, outcome.unproven, thresholds),
+        unexplained_remark(rest, 0.0 if gained.is_rejected else outcome.elsewhere, outcome.unproven, thresholds),
         thresholds,
-        worse=won.is_loss,
+        worse=gained.is_loss,
         withheld=_is_silent(found, given)
-        or bool(named.limits or found.zero_changes or found.own_gains or found.nearest),
+        or bool(named.limits or found.zero_changes or found.own_gains or found.nearest_law),
     )
     return Diagnosis(
         verdict,
@@ -140,12 +142,12 @@ def diagnosed(
         data_faults=(*integrity.faults, *noise),
         baseline=_goodness(baseline, force.before.held_out_n, left.before, scale),
         extended=_goodness(adopted.errors, force.error.held_out_n, adopted.left, scale),
-        gain=None if best.is_empty else won,
+        gain=None if best.is_empty else gained,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(adopted.errors.rmse**2, baseline.rmse**2),
-        rivals=causes[0].rivals if causes else _nearest(found),
+        rivals=causes[0].rivals if causes else _strongest_single_effects(found),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
+            found, causes, sessions, given.excitation, open_=not explained, worse=gained.is_loss
         ),
         limits=(*given.limits, *of_force, *_limits_of_the_names(found, given, named, extended)),
         limits_of_the_force=of_force,
@@ -154,7 +156,7 @@ def diagnosed(
         screening=found.screening,
         likeness=found.likeness,
         model=_with_offset(adopted.model, named.zeros, sessions, scale),
-        rejected=extended if won.is_rejected else None,
+        rejected=extended if gained.is_rejected else None,
         baseline_model=plain,
         force_model=_with_offset(force.model, named.zeros, force.fine, scale, force.undone) if has_own else None,
         parameters=parameters,
@@ -205,7 +207,7 @@ def _residuals_of(found: Inference, given: Prepared, faults: Sequence[DataFault]
 def _structure_left_by(model: ExtendedModel, given: Prepared) -> tuple[ResidualStructure, list[Array], list[Array]]:
     """The structure that a model leaves, and the residuals (n,) of each recording, thinned and at the full rate."""
     residuals, off = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
-    quick = repeating(given.fine, off, given.thresholds)
+    quick = repeating_structure(given.fine, off, given.thresholds)
     return residual_structure(given.sessions, residuals, given.thresholds, quick), residuals, off
 
 
@@ -214,15 +216,15 @@ def _is_silent(found: Inference, given: Prepared) -> bool:
     return given.is_no_unit or not found.can_validate
 
 
-def _named(found: Inference, given: Prepared, left: _Residuals) -> Chosen:
+def _named_causes(found: Inference, given: Prepared, left: _Residuals) -> NamedCauses:
     """The causes among what was ``found``."""
     most = max(left.within.rms, left.within.size)
     residual_sd = left.within.sd_of_mean(given.thresholds.hold_s)
-    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, residual_sd)
+    zeros = [] if _is_silent(found, given) else _material_zeros(found, given, most, residual_sd)
     return causes_among(found, given, zeros, most)
 
 
-def _with_held_drifts(model: ExtendedModel, named: Chosen, sessions: Sequence[Session]) -> ExtendedModel:
+def _with_held_drifts(model: ExtendedModel, named: NamedCauses, sessions: Sequence[Session]) -> ExtendedModel:
     """``model`` with drifts held from the end of the fitted data on, unless a law is ``named`` for them.
 
     Nothing tells how such a drift goes on. A flexible block is held too, whatever its kind is named.
@@ -234,10 +236,13 @@ def _with_held_drifts(model: ExtendedModel, named: Chosen, sessions: Sequence[Se
 
 @dataclass(frozen=True, slots=True)
 class _Outcome:
-    """The verdict and its grounds: gain ``won``, ``elsewhere`` (`held_out_excess`), ``unproven`` (`untested_rms`)."""
+    """The verdict and its grounds.
+
+    ``gained``: on held-out data; ``elsewhere``: the `held_out_excess`; ``unproven``: the `untested_rms`.
+    """
 
     verdict: Verdict
-    won: Gain
+    gained: Gain
     elsewhere: float
     unproven: float
 
@@ -246,11 +251,11 @@ def _outcome(
     found: Inference,
     given: Prepared,
     left: _Residuals,
-    named: Chosen,
+    named: NamedCauses,
     causes: Sequence[Cause],
-    won: Gain,
+    gained: Gain,
 ) -> _Outcome:
-    """The verdict, from the structures ``left`` and the gain ``won`` on held-out data."""
+    """The verdict, from the structures ``left`` and what is ``gained`` on held-out data."""
     fine, off, fault_error, thresholds = given.fine, left.residuals_after, left.fault_error, given.thresholds
     within = max(left.within.size, beyond_noise(fine, off, thresholds), fault_error)
     elsewhere = held_out_excess(fine, off, within, thresholds)
@@ -260,24 +265,24 @@ def _outcome(
         before = left.residuals_before if found.can_validate and causes else None
         unproven = untested_rms(fine, off, left.after, thresholds, fault_error, before)
     if given.is_no_unit:  # a reading that follows something other than the load is no unit's, however well it fits
-        return _Outcome("unexplained", won, elsewhere, unproven)
+        return _Outcome("unexplained", gained, elsewhere, unproven)
     # An unsure companion of a sure cause does not mean that there is no law.
-    follows = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
+    is_lawful = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
     # What the model follows is real, even without a name, or with too little left to be tested.
     least = max(thresholds.tolerable, thresholds.material, fault_error)
-    gained = 0.0 if causes else won.certain_fall(given.scale)
-    besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, gained) if one > least))
-    worse = won.is_loss or won.growth(given.scale) > thresholds.tolerable
+    certain_fall = 0.0 if causes else gained.certain_fall(given.scale)
+    besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, certain_fall) if one > least))
+    worse = gained.is_loss or gained.growth(given.scale) > thresholds.tolerable
     verdict = verdict_of(
-        causes, left.before, left.after, thresholds, follows, fault_error, worse=worse, elsewhere=besides
+        causes, left.before, left.after, thresholds, is_lawful, fault_error, worse=worse, elsewhere=besides
     )
-    return _Outcome(verdict, won, elsewhere, unproven)
+    return _Outcome(verdict, gained, elsewhere, unproven)
 
 
 def _limits_of_the_force(
     found: Inference,
     given: Prepared,
-    named: Chosen,
+    named: NamedCauses,
     extended: ExtendedModel,
     force: Compensation,
     outcome: _Outcome,
@@ -285,16 +290,16 @@ def _limits_of_the_force(
     own_zero_offsets: OwnZeros | None,
 ) -> tuple[str, ...]:
     """What limits a calibration's force: loads beyond the fitted ones, effects that are not undone, zeros, gains."""
-    won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
-    ways = loads_beyond_fit(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
+    gained, elsewhere, thresholds = outcome.gained, outcome.elsewhere, given.thresholds
+    ways = loads_beyond_fit(given.sessions, given.scale, thresholds) if gained.is_rejected or elsewhere else None
     undone = extended if force.is_plain else force.model
     return (
-        *([limit_rejected(won, ways)] if won.is_rejected else []),
-        *([limit_held_out_excess(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
+        *([limit_rejected(gained, ways)] if gained.is_rejected else []),
+        *([limit_held_out_excess(elsewhere, left.within.size, ways)] if elsewhere and not gained.is_rejected else []),
         *limit_force(force),
         *limit_clipped(force),
         *limit_latency_left(force),
-        *([] if won.is_rejected else limit_not_undone(undone, given.fine[0].conditions.step_s)),
+        *([] if gained.is_rejected else limit_not_undone(undone, given.fine[0].conditions.step_s)),
         *([] if force.is_plain else limit_drift_held(force, thresholds)),
         *named.zero_limits,
         *limit_own_gains(found.own_gains),
@@ -304,7 +309,9 @@ def _limits_of_the_force(
     )
 
 
-def _limits_of_the_names(found: Inference, given: Prepared, named: Chosen, extended: ExtendedModel) -> tuple[str, ...]:
+def _limits_of_the_names(
+    found: Inference, given: Prepared, named: NamedCauses, extended: ExtendedModel
+) -> tuple[str, ...]:
     """What limits the names: effects that are no causes, models at the end of their range, refused effects."""
     of_model = (
         limit_relaxation_range(extended, given.sessions, given.thresholds),
@@ -324,12 +331,12 @@ def _structure_where_fitted(
     return residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
 
 
-def _nearest(found: Inference) -> tuple[Rival, ...]:
+def _strongest_single_effects(found: Inference) -> tuple[Rival, ...]:
     """The few single effects that explain most, without flexible blocks, where no cause is named."""
     return tuple([Rival(name, fall, "alone") for name, fall in found.screening if name in catalogue()][:SAID])
 
 
-def _zeros(found: Inference, given: Prepared, left: float, residual_sd: float) -> list[Zero]:
+def _material_zeros(found: Inference, given: Prepared, left: float, residual_sd: float) -> list[Zero]:
     """The material offsets and tares that are seen beside what was ``found``."""
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     lasting_memory = math.hypot(*(one.size for one in found.members if one.effect.never_fades))

@@ -31,17 +31,17 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     fitted = [one for one in sessions if _has_enough(one.fitted)]
     if not fitted:
         return Ranges()
-    kept = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
+    pairs = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
     trap = False
     unit = scale.unit.symbol
     to_physical = scale.reading / scale.load_n
-    within = [_gain(load, reading, thresholds.follows) for load, reading in kept]
-    is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in kept)
+    within = [_gain(load, reading, thresholds.follows) for load, reading in pairs]
+    is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in pairs)
     if is_narrow and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
-        through_zero = float(np.median([reading.mean() / load.mean() for load, reading in kept]))
-        lowest = min(range(len(kept)), key=lambda k: float(kept[k][0].min()))
-        low, high = (float(of(kept[lowest][0])) * scale.load_n for of in (np.min, np.max))
+        through_zero = float(np.median([reading.mean() / load.mean() for load, reading in pairs]))
+        lowest = min(range(len(pairs)), key=lambda k: float(pairs[k][0].min()))
+        low, high = (float(of(pairs[lowest][0])) * scale.load_n for of in (np.min, np.max))
         is_gauge = scale.unit.quantity == "pressure"  # for others zero is a convention
         trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
@@ -56,7 +56,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 else ": what lies below is extrapolated"
             )
         )
-    low, high = min(float(load.min()) for load, _ in kept), max(float(load.max()) for load, _ in kept)
+    low, high = min(float(load.min()) for load, _ in pairs), max(float(load.max()) for load, _ in pairs)
     if thresholds.clear * low > high and not any(within):
         trap = True
         said.append(
@@ -64,13 +64,13 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             " reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load it"
             " over its range)"
         )
-    said += _limit_flat_reading(kept, scale, thresholds)
+    said += _limit_flat_reading(pairs, scale, thresholds)
     judged = [one for one in sessions if not _has_enough(one.fitted) and _has_enough(one.judged)]
     beside = [_gain(one.conditions.load[one.judged], one.reading[one.judged], thresholds.follows) for one in judged]
     named = [one.recording.name for one in (*fitted, *judged)]
     said += _limit_foreign_gain(list(zip(named, (*within, *beside), strict=True)), thresholds)
     said += _limit_unlike_gain(fitted, thresholds)
-    between = _gain_between_files(kept, thresholds.same)
+    between = _gain_between_files(pairs, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
         gains = [gain for gain in within if gain is not None]
         # Somewhere on its way a curve is as steep as its chord.
@@ -90,13 +90,13 @@ def _has_enough(seen: Mask) -> bool:
     return int(seen.sum()) > 10
 
 
-def _limit_flat_reading(kept: Sequence[tuple[Array, Array]], scale: Scale, thresholds: Thresholds) -> list[str]:
+def _limit_flat_reading(pairs: Sequence[tuple[Array, Array]], scale: Scale, thresholds: Thresholds) -> list[str]:
     """The sentence on a reading that stands still over the upper loads, as at a mechanical stop.
 
     In the recording of the highest load, medians of the reading over the upper share `same` of its loads, or more,
     differ from the last by less than `standing` of its span.
     """
-    load, reading = max(kept, key=lambda one: float(one[0].max()))
+    load, reading = max(pairs, key=lambda one: float(one[0].max()))
     order = np.argsort(load)
     groups = np.array_split(order, max(1, min(order.size // thresholds.few, GROUPS)))
     levels = np.array([float(np.median(reading[group])) for group in groups])
@@ -206,12 +206,12 @@ def _gain(load: Array, reading: Array, follows: float) -> float | None:
     return float(a @ b / (a @ a)) if size > 0 and float(a @ b) ** 2 > follows * size**2 else None
 
 
-def _gain_between_files(kept: Sequence[tuple[Array, Array]], apart: float) -> float | None:
+def _gain_between_files(pairs: Sequence[tuple[Array, Array]], apart: float) -> float | None:
     """Slope of the files' mean readings on their mean loads; None where these lie within ``apart`` full scales."""
-    if len(kept) < 2:
+    if len(pairs) < 2:
         return None
-    loads = np.array([load.mean() for load, _ in kept])
-    readings = np.array([reading.mean() for _, reading in kept])
+    loads = np.array([load.mean() for load, _ in pairs])
+    readings = np.array([reading.mean() for _, reading in pairs])
     if np.ptp(loads) < apart:
         return None
     a = loads - loads.mean()

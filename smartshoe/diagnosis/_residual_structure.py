@@ -10,9 +10,9 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._denoise import noise_sd
-from smartshoe.diagnosis._excitation import stays
+from smartshoe.diagnosis._excitation import stays_still
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
-from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, slow
+from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating_structure, slow_structure
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 
@@ -34,12 +34,12 @@ class ResidualStructure:
     @property
     def rms(self) -> float:
         """The largest rms of the significant tests, 0 where none is."""
-        return max(self._found, default=0.0)
+        return max(self._significant_rms, default=0.0)
 
     @property
     def significant(self) -> bool:
         """Whether any test is significant."""
-        return bool(self._found)
+        return bool(self._significant_rms)
 
     @property
     def how(self) -> str:
@@ -74,7 +74,7 @@ class ResidualStructure:
         return self.memory is not None or self.slow.would_detect(self.size)
 
     @property
-    def _found(self) -> list[float]:
+    def _significant_rms(self) -> list[float]:
         if self.memory is not None and self.memory.is_noise:
             return [self.repeating.rms] if self.repeating.significant else []
         found = [one.rms for one in (self.repeating, self.slow) if one.significant]
@@ -96,12 +96,12 @@ def residual_structure(
     says = worst_place(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
-    repeats = repeating(sessions, residuals, thresholds)
+    repeats = repeating_structure(sessions, residuals, thresholds)
     if quick is not None and quick.significant and quick.rms > repeats.rms:
         repeats = quick
     return ResidualStructure(
         repeats,
-        slow(sessions, residuals, thresholds),
+        slow_structure(sessions, residuals, thresholds),
         memory,
         says,
         beyond_noise(sessions, residuals, thresholds),
@@ -128,7 +128,7 @@ def worst_place(sessions: Sequence[Session], residuals: Sequence[Array], thresho
         smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
         load.append(session.conditions.load)
         rate.append(session.conditions.rate_per_s)
-        stay.append(stays(session, thresholds))
+        stay.append(stays_still(session, thresholds))
         error.append(smooth)
         names += [index] * residual.size
     loads, rates, errors = (np.concatenate(x) for x in (load, rate, error))

@@ -12,7 +12,7 @@ MOST_MEMBERS = 7
 BREADTH = 5  # most probable additions that are weighed for a set
 SWAPS = 3  # additions that are weighed in the place of each member; also whole-model fits that are pursued
 RIVALS = 2  # rivals fitted as whole models beside the best one; also shapes that a fit starts from
-DEAD_HEAT = 1e-6  # of -2 log evidence: scores that differ by less are equal
+SCORE_TOLERANCE = 1e-6  # of -2 log evidence: scores that differ by less are equal
 
 
 def is_admissible(evidence: Evidence, found: Posterior) -> bool:
@@ -52,7 +52,7 @@ def best_additions(
     return [k for _, k in sorted(best.values())[:breadth]]
 
 
-def step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
+def best_step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
     """The best set that one addition, removal or swap makes of ``start``, or ``start`` itself."""
     best = evidence.posterior(start)
     sets: list[Members] = []
@@ -70,8 +70,8 @@ def search(evidence: Evidence, start: Members = (), banned: Collection[str] = ()
     """The best set that repeated steps reach from ``start``."""
     best = evidence.posterior(start)
     while True:
-        found = step(evidence, best.members, banned)
-        if found.score >= best.score - DEAD_HEAT:
+        found = best_step(evidence, best.members, banned)
+        if found.score >= best.score - SCORE_TOLERANCE:
             return best
         best = found
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
 from smartshoe.diagnosis._session import Session, fitted_of, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
@@ -34,13 +34,13 @@ NON_PRESSURES = frozenset({"force", "length", "resistance", "capacitance", "angl
 class Candidate:
     """An effect, or a flexible block, at one point of its shapes, and the columns of its strengths.
 
-    ``is_apart``: the data distinguishes its branch from the others of its family.
+    ``is_distinguishable``: the data distinguishes its branch from the others of its family.
     """
 
     effect: Effect
     shape: Mapping[str, float]
     columns: tuple[int, ...]
-    is_apart: bool = True
+    is_distinguishable: bool = True
 
     @property
     def name(self) -> str:
@@ -50,7 +50,7 @@ class Candidate:
     @property
     def branch(self) -> str:
         """The branch of a family: a unit has one law, or the flexible block in its place, of each branch."""
-        return (self.is_apart and self.effect.branch) or self.effect.kind
+        return (self.is_distinguishable and self.effect.branch) or self.effect.kind
 
     @property
     def slot(self) -> str:
@@ -82,7 +82,7 @@ def is_remembered_by_gas(effect: Effect) -> bool:
     return effect.stage == "gas" and not effect.is_memoryless
 
 
-def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
+def available_effects(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
     """Physical effects and flexible blocks that this data could show: their channels are logged in every recording.
 
     Left out are effects that shift load or reading by a constant, which no waveform distinguishes from a recording's
@@ -237,7 +237,7 @@ class Linearised:
             fit = np.linalg.lstsq(columns[mask], residual[mask], rcond=None)[0]
             left.append(residual - columns @ fit)
         masks = [session.fitted for session in self.sessions]
-        return correlated_sd(left, masks)
+        return effective_noise_sd(left, masks)
 
 
 def marginal(rows: Array, session: Session, pole_per_s: float) -> Array:
@@ -296,7 +296,7 @@ def linearised(
     """The columns about ``model``; columns of ``nearby``, a similar model, serve effects that are in neither."""
     fitted = fitted_of(sessions)
     inside = {part.name: part for part in model.parts}
-    outside = [e for e in available(fitted, thresholds) if e.name not in inside]
+    outside = [e for e in available_effects(fitted, thresholds) if e.name not in inside]
     channels = logged_channels(fitted)
     present = excitation_of(fitted, thresholds).tells_apart
     apart = {one.name: is_told_from_its_family(one, present) for one in (*outside, *(p.effect for p in model.parts))}

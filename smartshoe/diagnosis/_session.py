@@ -30,7 +30,7 @@ from smartshoe.signals.loading import rises_of
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
 
-LEAST_WINDOW = 3  # samples on either side of the average: a resolution, half and twice changed no name in two cases
+LEAST_WINDOW = 3  # samples on either side of the average, a resolution: half and twice changed no name in two cases
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def prepare(
         past = histories.get(_predecessor(recording), _History())
         made[index] = _session(recording, index, usable[index], scale, factors[index], past, thresholds)
         histories[recording.name] = _history_after(made[index].conditions, thresholds)
-    sessions = _on_one_scale([made[index] for index in range(len(recordings))])
+    sessions = _with_common_temperature_zero([made[index] for index in range(len(recordings))])
     if held_out is not None:
         return [
             replace(session, held_out=np.full(session.reading.size, out))
@@ -149,7 +149,7 @@ def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresho
     return kept
 
 
-def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
+def _with_common_temperature_zero(sessions: Sequence[Session]) -> list[Session]:
     """``sessions`` with temperatures relative to the first temperature logged in any of them."""
     logged = [kelvin for one in sessions if (kelvin := one.conditions.temperature_k) is not None]
     return [
@@ -202,7 +202,7 @@ def at_full_rate(
     sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds
 ) -> list[Session]:
     """The same sessions without thinning, with the same cycles and held-out parts."""
-    return _on_one_scale(
+    return _with_common_temperature_zero(
         [
             _session(one.recording, one.index, mask, scale, 1, _History.of(one.conditions), thresholds, one)
             for one, mask in zip(sessions, usable, strict=True)
@@ -263,7 +263,7 @@ def _session(
     auxiliary = {name: smoothed(values, weights, factor) for name, values in logged.auxiliary.items()}
     conditions = Conditions(
         logged.time_s[::factor],
-        smoothed(_rests_levelled(denoised.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
+        smoothed(_with_level_rests(denoised.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
         step_s * factor,
         denoised.remaining_sd * float(np.sqrt(np.sum(weights**2))),
         temperature_k=auxiliary.get("temperature_k"),
@@ -375,7 +375,7 @@ def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thre
     return fall < thresholds.standing
 
 
-def _rests_levelled(load: Array, level: float, reach: float) -> Array:
+def _with_level_rests(load: Array, level: float, reach: float) -> Array:
     """``load`` with each rest at its mean, up to ``reach``: an unloaded unit does not feel the load cell's noise."""
     out = load.copy()
     for first, last in zip(*runs_of(load < level), strict=True):

@@ -47,7 +47,7 @@ def settled(state: State, progress: Progress, rival: State | None = None) -> Sta
         state = state_at(found, state.banned, linearisation)
         best = state if _has_as_much_evidence(state, best) else best
     if best is not state and state.is_worth_a_fit:  # its best set has been tried
-        state = replace(best, best=best.evidence.posterior(best.start))
+        state = replace(best, best=best.evidence.posterior(best.fitted_members))
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood()
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
@@ -62,7 +62,7 @@ def _has_as_much_evidence(state: State, other: State) -> bool:
     Each is linearised about its own fit; what no column explains there counts as noise.
     """
     noise_sd = min(state.evidence.noise_sd, other.evidence.noise_sd)
-    new, old = (Evidence(one.linearisation, noise_sd).posterior(one.start).score for one in (state, other))
+    new, old = (Evidence(one.linearisation, noise_sd).posterior(one.fitted_members).score for one in (state, other))
     return new <= old
 
 
@@ -81,8 +81,8 @@ def simpler_from_single_effects(initial: State, state: State, progress: Progress
     likelihood, fits = state.likelihood(), []
     if effect_count(state.fit.model) - effect_count(initial.fit.model) > 1:
         few = [
-            initial.evidence.posterior((*initial.start, k))
-            for k in best_additions(initial.evidence, initial.start, RIVALS)
+            initial.evidence.posterior((*initial.fitted_members, k))
+            for k in best_additions(initial.evidence, initial.fitted_members, RIVALS)
         ]
         fits = [fit_of_set(initial, one, likelihood) for one in few]
     if any(part.effect.is_latency or isinstance(part.effect, CoreEffect) for part in state.fit.model.parts):
@@ -148,7 +148,7 @@ def _trial_sets(state: State) -> list[Posterior]:
 
     A large effect changes the model about which its rivals were linearised, so that fits of the best few decide.
     """
-    start = state.start
+    start = state.fitted_members
     if not state.exceeds_linear_range or len(start) >= MOST_MEMBERS:
         return [state.best]
     taken = {state.linearisation.candidates[m].slot for m in start}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis._likelihood import MOST_STEPS, Fit, Likelihood, fit
-from smartshoe.diagnosis._search import DEAD_HEAT, search, step
+from smartshoe.diagnosis._search import SCORE_TOLERANCE, best_step, search
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -47,7 +47,7 @@ class State:
     @property
     def score_gain(self) -> float:
         """By how much the score of the best set is lower than that of the fitted set."""
-        return self.evidence.posterior(self.start).score - self.best.score
+        return self.evidence.posterior(self.fitted_members).score - self.best.score
 
     @property
     def is_worth_a_fit(self) -> bool:
@@ -55,17 +55,17 @@ class State:
 
         Equality does not count: that is the gain of removing an effect that does nothing, which needs no other fit.
         """
-        return self.score_gain > self.evidence.odds + DEAD_HEAT
+        return self.score_gain > self.evidence.odds + SCORE_TOLERANCE
 
     @property
-    def start(self) -> Members:
+    def fitted_members(self) -> Members:
         """The candidates that are in the fitted model."""
         return _set_of(self.fit.model, self.linearisation)
 
     @property
     def exceeds_linear_range(self) -> bool:
         """Whether a new effect of the best set is too large for the linearisation."""
-        return _exceeds_linear_range(self.best, self.start, self.thresholds)
+        return _exceeds_linear_range(self.best, self.fitted_members, self.thresholds)
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -97,7 +97,7 @@ def linearised_search(
     linearisation = linearised(model, sessions, thresholds) if linearisation is None else linearisation
     evidence = Evidence(linearisation, linearisation.noise_sd())
     start = _set_of(model, linearisation)
-    first = step(evidence, start, banned)
+    first = best_step(evidence, start, banned)
     if _exceeds_linear_range(first, start, thresholds):
         return evidence, first
     return evidence, search(evidence, first.members, banned)

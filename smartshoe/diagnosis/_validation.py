@@ -27,8 +27,8 @@ class LeftOut:
     where the fit to all of them ended, so that few steps are needed.
 
     Two recordings of several load cycles each may also be judged by leaving out the same third of both. Either may hold
-    a rate or a peak that the other lacks, so that the one cannot predict the other. With ``is_apart`` this is not done,
-    since the question is what differs between recordings.
+    a rate or a peak that the other lacks, so that the one cannot predict the other. Not with ``by_recording``: there
+    the question is what differs between recordings.
     """
 
     def __init__(
@@ -38,10 +38,10 @@ class LeftOut:
         like: ExtendedModel,
         thresholds: Thresholds,
         *,
-        is_apart: bool = False,
+        by_recording: bool = False,
     ) -> None:
         self.sessions, self.thresholds = sessions, thresholds
-        thirds = [] if is_apart else thirds_of(sessions, thresholds)
+        thirds = [] if by_recording else thirds_of(sessions, thresholds)
         self._schemes = [
             (folds, [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in folds])
             for folds in (folds_of(sessions), thirds)

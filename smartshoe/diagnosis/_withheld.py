@@ -29,7 +29,7 @@ from smartshoe.diagnosis._zero import Zero, creeping_tare
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class NamedCauses:
     """The ``names`` and ``zeros`` that are causes, and sentences on those that are not: ``limits``, ``zero_limits``.
 
     ``unnamed_rms`` is the size of the largest effect without a name, rms as a share of full scale.
@@ -41,14 +41,14 @@ class Chosen:
     unnamed_rms: float = 0.0
     zero_limits: tuple[str, ...] = ()
 
-    def without(self, why: Callable[[Name], str | None]) -> Chosen:
+    def without(self, why: Callable[[Name], str | None]) -> NamedCauses:
         """The same without the names for which ``why`` gives a reason; the reasons join ``limits``."""
         reasons = [why(one) for one in self.names]
         kept = tuple(one for one, said in zip(self.names, reasons, strict=True) if said is None)
         return replace(self, names=kept, limits=(*self.limits, *(said for said in reasons if said is not None)))
 
 
-def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], residual_rms: float) -> Chosen:
+def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], residual_rms: float) -> NamedCauses:
     """The causes among the effects ``found`` and the ``zeros`` seen; ``residual_rms``: structure without an effect."""
     thresholds = given.thresholds
     chosen = _shown(found, given, residual_rms)
@@ -79,7 +79,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
             one.may_have_drifted or one.extrapolated_from or (found.zero_changes and one.effect.shifts == "reading")
         )
     )
-    chosen = Chosen(names, kept, (*before, *chosen.limits), chosen.unnamed_rms, (*past, *led))
+    chosen = NamedCauses(names, kept, (*before, *chosen.limits), chosen.unnamed_rms, (*past, *led))
     chosen = chosen.without(
         lambda one: reason_tare_creeps(one, creeping_tare(kept, one.effect, one.member.size, thresholds))
     )
@@ -87,7 +87,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
     return replace(chosen, zero_limits=(*chosen.zero_limits, *limit_force_as_logged(kept, given.scale), *of_tare))
 
 
-def _with_what_is_remembered(chosen: Chosen, found: Inference, given: Prepared) -> Chosen:
+def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepared) -> NamedCauses:
     """``chosen`` with those drifts half sure at most that may be a memory of loads before the recordings."""
     about = found.fit.model, given.sessions, given.thresholds
     unsure = [one for one in chosen.names if may_be_remembered(one, *about)]
@@ -95,7 +95,7 @@ def _with_what_is_remembered(chosen: Chosen, found: Inference, given: Prepared) 
     return replace(chosen, names=names, limits=(*chosen.limits, *(limit_remembered(one) for one in unsure)))
 
 
-def _shown(found: Inference, given: Prepared, residual_rms: float) -> Chosen:
+def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCauses:
     """The names of what was found, without effects of no named kind and effects that this data cannot show.
 
     Whenever such an effect is removed all others are named again, so that none is named for being beside it.
@@ -123,7 +123,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> Chosen:
             likely = names_of(
                 cancelling_members, residual_rms, thresholds, is_unsteady=True, best_single=found.best_single
             )
-        shown = Chosen(likely, (), limits).without(
+        shown = NamedCauses(likely, (), limits).without(
             lambda one: (
                 reason_of_another_kind(one, found.fit.model, thresholds)
                 or reason_not_shown(one, given.excitation)

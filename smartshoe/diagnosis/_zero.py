@@ -123,7 +123,7 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         if is_rest and lasts_s >= thresholds.settled_s:
             whole = model.simulate(session.conditions)
             still = (session.reading - (whole - at_rest))[first][kept]
-            past = _remembered(session, model, session.reading - whole, still, first, thresholds)[first][kept]
+            past = _initial_memory(session, model, session.reading - whole, still, first, thresholds)[first][kept]
             drifted = float(np.mean((whole - at_rest)[first][kept]))
             drift_and_memory = np.array([drifted + np.mean(past), drifted + past[0]]) / model.gain
             reading = float(np.mean(still - past)) / model.gain
@@ -133,7 +133,7 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
     return np.array(found).reshape(-1, 6)
 
 
-def _remembered(
+def _initial_memory(
     session: Session, model: ExtendedModel, residual: Array, rest: Array, first: slice, thresholds: Thresholds
 ) -> Array:
     """(n,) the memory of loads before the recording that is seen in it; zeros where its ``rest`` (k,) denies it.

@@ -24,7 +24,7 @@ from smartshoe.models.effects import catalogue
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 
-USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # of full scale; of a log: where no unit states its own
+USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # noise, and rate of the log, where no unit states its own
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,7 +124,7 @@ def test_a_latency_is_the_best_that_is_not_there_yet_beside_a_usual_arm(monkeypa
         begun.append((one.name, bare.names, bare.relaxing_share, bare.relaxation_rate_per_s))
         return one.name
 
-    monkeypatch.setattr(_arms, "available", lambda sessions, thresholds: late)
+    monkeypatch.setattr(_arms, "available_effects", lambda sessions, thresholds: late)
     monkeypatch.setattr(_arms, "start_with", begin)
     monkeypatch.setattr(_arms, "fit", lambda likelihood, name: SimpleNamespace(model=name, cost=-len(name)))
     likelihood = SimpleNamespace(sessions=())

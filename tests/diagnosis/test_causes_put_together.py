@@ -106,7 +106,7 @@ def test_of_what_is_no_unit_or_one_cycle_no_zero_is_told(parts: Any) -> None:
     parts.given.is_no_unit = True
     told = run_diagnosis(parts)
     assert (told.causes, told.verdict) == ((), "unexplained")
-    assert parts.seen["inferred"][0][4] is False
+    assert parts.seen["infer_with_gas_check"][0][4] is False
     parts.seen.clear()
     parts.given.is_no_unit, parts.found.can_validate = False, False
     assert run_diagnosis(parts).causes == ()

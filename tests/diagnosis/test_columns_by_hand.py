@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from told_columns import MODEL, STANDARD, STEP_S, past_columns, session_under, sessions_under, some_load
 from told_evidence import WAVE, session_of
 
-from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
     _factors,
-    available,
+    available_effects,
     departures,
     directions,
     lagged,
@@ -96,12 +96,12 @@ def test_an_effect_needs_its_channel_in_every_session() -> None:
     bare, beside, warm = session(), session(neighbour=WAVE), session(temperature_k=WAVE)
 
     def told(*sessions: Any) -> set[str]:
-        return {one.name for one in available(sessions, STANDARD)}
+        return {one.name for one in available_effects(sessions, STANDARD)}
 
     assert told(beside) - told(bare) == {"cross_talk"}
     assert told(beside, bare) == told(bare)
     assert told(warm) >= told(bare)
-    for one in available([bare], STANDARD):
+    for one in available_effects([bare], STANDARD):
         assert one.is_physical
         assert one.shifts is None
         assert not one.is_refinement
@@ -114,7 +114,7 @@ def test_what_only_later_load_cycles_show_is_not_looked_for_where_no_recording_h
     twice = session_of(np.interp(np.arange(200), [0, 50, 100, 150, 199], [0.0, 1.0, 0.1, 0.6, 0.0]))
 
     def told(*sessions: Any) -> set[str]:
-        return {one.name for one in available(sessions, STANDARD)}
+        return {one.name for one in available_effects(sessions, STANDARD)}
 
     memories = {
         "mullins_softening", "cycle_conditioning", "gain_drift", "flexible_softening", "flexible_gain_drift",
@@ -205,7 +205,7 @@ def test_what_no_column_reaches_is_the_noise() -> None:
         left.append(
             row[:, 0] - row[:, 1:] @ found[:2] - past_columns(one, MODEL.pole_per_s) @ found[2 + 2 * k : 4 + 2 * k]
         )
-    expected = correlated_sd(left, [one.fitted for one in sessions])
+    expected = effective_noise_sd(left, [one.fitted for one in sessions])
     assert given.noise_sd() == pytest.approx(expected, rel=1e-6)
     parts = [marginal(r, one, MODEL.pole_per_s) for r, one in zip(rows, sessions, strict=True)]
     assert given.gram[0, 0] == pytest.approx(sum(part[0, 0] for part in parts))

@@ -201,7 +201,7 @@ def test_what_follows_neither_load_nor_direction_has_no_course(monkeypatch: pyte
         return _said(monkeypatch, found), friction_of(run, STANDARD)
 
     assert told(0.29, 0.29) == (None, None)
-    monkeypatch.setattr(_characteristic, "_comes_back", lambda recording, thresholds: True)
+    monkeypatch.setattr(_characteristic, "_is_reproducible", lambda recording, thresholds: True)
     for by_branch in (FOLLOWS, 0.9):
         curve, friction = told(0.29, by_branch)
         assert curve == friction

@@ -285,7 +285,7 @@ def _next(
     made = {name: (lambda peak_n, name=name: _pressing(name, lasting[name], rate_n_per_s)) for name in lasting}
     monkeypatch.setattr(_next_experiment, "EXPERIMENTS", made)
     unseen = NextExperiment((), "unseen", None, "unseen", None, _pressing("unseen", 50.0, rate_n_per_s))
-    monkeypatch.setattr(_next_experiment, "_protocol_of_what_is_lacking", lambda *given: unseen)
+    monkeypatch.setattr(_next_experiment, "_protocol_for_missing_excitation", lambda *given: unseen)
     found: Any = SimpleNamespace(
         fit=SimpleNamespace(model=MODEL), can_validate=can_validate, own_gains=own_gains, zero_changes=zero_changes
     )

@@ -19,7 +19,7 @@ from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gauss_markov import gauss_markov_of
 from smartshoe.diagnosis._inference import independent_count
-from smartshoe.diagnosis._lack_of_fit import slow
+from smartshoe.diagnosis._lack_of_fit import slow_structure
 from smartshoe.diagnosis._residual_structure import worst_place
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import offsets
@@ -102,10 +102,10 @@ def test_noise_that_is_louder_in_parts_is_no_structure(sessions: list[Session]) 
     for session in sessions:
         loud = np.where(np.arange(session.reading.size) // 200 % 2 == 0, 1.0, 4.0)
         found.append(0.001 * loud * rng.standard_normal(loud.size))
-    assert abs(slow(sessions, found, Thresholds(hold_s=1.0)).z) < 4.0
+    assert abs(slow_structure(sessions, found, Thresholds(hold_s=1.0)).z) < 4.0
     sines = [0.002 * np.sin(2 * np.pi * session.conditions.time_s / 20.0) for session in sessions]
     both = [noise + sine for noise, sine in zip(found, sines, strict=True)]
-    assert slow(sessions, both, Thresholds(hold_s=1.0)).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
+    assert slow_structure(sessions, both, Thresholds(hold_s=1.0)).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
 
 
 def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list[Session]) -> None:

@@ -53,7 +53,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
     assert seen["next_experiment"][1] == {"open_": False, "worse": False}  # as little is left as is explained
-    assert seen["inferred"][0][4] is True
+    assert seen["infer_with_gas_check"][0][4] is True
 
 
 def test_the_sentence_is_told_what_is_in_the_model_and_what_is_left(parts: Any) -> None:

@@ -15,7 +15,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._search import best_additions, is_admissible, search, step
+from smartshoe.diagnosis._search import best_additions, best_step, is_admissible, search
 from smartshoe.diagnosis._sensitivity import Linearised, departures, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._state import linearised_search, state_at, with_members
@@ -256,10 +256,10 @@ def test_the_best_set_is_better_than_all_that_one_change_makes_of_it(two: tuple[
 
 def test_a_step_is_one_change_and_never_for_the_worse(two: tuple[Linearised, Evidence]) -> None:
     _, evidence = two
-    first = step(evidence)
+    first = best_step(evidence)
     assert len(first.members) == 1
     assert first.score < evidence.posterior(()).score
-    second = step(evidence, first.members)
+    second = best_step(evidence, first.members)
     assert len(set(second.members) ^ set(first.members)) in (1, 2)
     assert second.score <= first.score
 
@@ -323,7 +323,7 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
     given, _ = two
     plain = fit(Likelihood(given.sessions, SD, MODEL, STANDARD), MODEL)
     state = state_at(plain)
-    assert state.start == ()
+    assert state.fitted_members == ()
     assert state.score_gain == pytest.approx(state.evidence.posterior(()).score - state.best.score)
     assert state.score_gain > state.evidence.odds
     assert state.is_worth_a_fit
@@ -425,8 +425,8 @@ def test_slopes_that_are_brought_up_to_date_are_nearly_those_computed_anew(
     assert cost == pytest.approx(exact[0], rel=1e-9)
     scale = np.sqrt(np.diag(exact[2]))
     # Nearer than the slopes from before in the one direction that was gone.
-    step = (theta - start.theta) * scale
-    curved = [(one / np.outer(scale, scale)) @ step for one in (normal, before[2], exact[2])]
+    best_step = (theta - start.theta) * scale
+    curved = [(one / np.outer(scale, scale)) @ best_step for one in (normal, before[2], exact[2])]
     assert np.linalg.norm(curved[0] - curved[2]) < 0.8 * np.linalg.norm(curved[1] - curved[2])
     assert pull / scale == pytest.approx(exact[1] / scale, abs=0.1 * float(np.linalg.norm(exact[1] / scale)))
 

@@ -350,7 +350,7 @@ def test_where_nothing_jumps_no_moment_is_taken(monkeypatch: pytest.MonkeyPatch)
     values = run.sensors[0].values + SPAN_MBAR * 0.015 * (run.time_s >= 14.0)
     sessions = _sessions(_run(0, 0.0), run.with_channel(replace(run.sensors[0], values=values)), _run(2, 0.0))
     state = _state(CURVED, sessions)
-    found = _OwnTerms(sessions, Evidence(state.evidence.linearisation, SD), state.start)
+    found = _OwnTerms(sessions, Evidence(state.evidence.linearisation, SD), state.fitted_members)
     assert with_changes(state, found, of_zero=True) is not found
     monkeypatch.setattr(_gains_and_zeros, "may_jump", lambda *given: False)
     assert with_changes(state, found, of_zero=True) is found

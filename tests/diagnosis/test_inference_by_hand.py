@@ -151,7 +151,7 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
         assert (found.screening, found.likeness) == ("screening", "likeness")
-        assert found.nearest is None  # nothing may be named, whatever fits
+        assert found.nearest_law is None  # nothing may be named, whatever fits
         assert found.baseline is found.fit
 
 
@@ -372,7 +372,8 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
 
     monkeypatch.setattr(_inference, "LeftOut", Left)
     begun: Any = SimpleNamespace(
-        linearisation=evidence.linearisation, evidence=evidence, start=(), thresholds=STANDARD, likelihood=lambda: None,
+        linearisation=evidence.linearisation, evidence=evidence, fitted_members=(),
+        thresholds=STANDARD, likelihood=lambda: None,
         fit=SimpleNamespace(model="plain"),
     )  # fmt: skip
     plain: Any = SimpleNamespace(model="plain")

@@ -19,7 +19,7 @@ from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._diagnose import _limit_missing_predecessor
 from smartshoe.diagnosis._jittered import jitter_s
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
-from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
+from smartshoe.diagnosis._sensitivity import available_effects, logged_channels, nuisance_precision
 from smartshoe.diagnosis._session import Session, at_full_rate, kernel, prepare, smoothed, without_predecessor
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.units import MILLIBAR
@@ -317,10 +317,10 @@ def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> Non
         time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * load, pressure_2_mbar=35.0 * load
     )
     alone, both = prepared(pressed(load))[0], prepared(beside)[0]
-    assert "cross_talk" not in {one.name for one in available(alone, STANDARD)}
-    assert "cross_talk" in {one.name for one in available(both, STANDARD)}
-    assert "cross_talk" not in {one.name for one in available([*alone, *both], STANDARD)}
-    found = available(alone, STANDARD)
+    assert "cross_talk" not in {one.name for one in available_effects(alone, STANDARD)}
+    assert "cross_talk" in {one.name for one in available_effects(both, STANDARD)}
+    assert "cross_talk" not in {one.name for one in available_effects([*alone, *both], STANDARD)}
+    found = available_effects(alone, STANDARD)
     assert all(one.is_physical and one.shifts is None and not one.is_refinement for one in found)
     assert {"delay", "linear_leak", "dead_band"} <= {one.name for one in found}
 

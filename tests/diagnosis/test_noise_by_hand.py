@@ -26,7 +26,7 @@ from smartshoe.diagnosis._gauss_markov import (
     _past_is_known,
     gauss_markov_of,
 )
-from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
 from smartshoe.models.effects import Conditions
 
 Array = NDArray[np.float64]
@@ -317,17 +317,17 @@ def test_a_correlation_time_is_the_sum_of_covariances_up_to_the_first_that_is_no
     rng = np.random.default_rng(4)
     signals = [lfilter([1.0], [1.0, -0.8], rng.standard_normal(size)) for size in (150, 90, 40)]
     kept = [np.ones(150, dtype=bool), rng.random(90) < 0.8, np.zeros(40, dtype=bool)]
-    assert correlated_sd(signals, kept) == pytest.approx(_slow_sd(signals, kept), rel=1e-6)
+    assert effective_noise_sd(signals, kept) == pytest.approx(_slow_sd(signals, kept), rel=1e-6)
     # Neighbours that alternate tell no more than samples that are none of each other's.
     alternating = np.resize([1.0, -1.0], 100)
-    assert correlated_sd([alternating], [np.ones(100, dtype=bool)]) == pytest.approx(1.0)
-    nothing = correlated_sd([np.ones(20)], [np.ones(20, dtype=bool)])
-    assert nothing == FLOOR == correlated_sd([], []) == 1e-6
+    assert effective_noise_sd([alternating], [np.ones(100, dtype=bool)]) == pytest.approx(1.0)
+    nothing = effective_noise_sd([np.ones(20)], [np.ones(20, dtype=bool)])
+    assert nothing == FLOOR == effective_noise_sd([], []) == 1e-6
 
 
 @pytest.mark.parametrize("size", [3e-7, 1e-6, 1e-4])
 def test_no_noise_is_less_than_a_sensors(size: float) -> None:
     """Neighbours that alternate count once each, so that their standard deviation is their size."""
     alternating = size * np.resize([1.0, -1.0], 100)
-    found = correlated_sd([alternating], [np.ones(100, dtype=bool)])
+    found = effective_noise_sd([alternating], [np.ones(100, dtype=bool)])
     assert found == pytest.approx(max(size + 1e-9, 1e-6), rel=1e-9)

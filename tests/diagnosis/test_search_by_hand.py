@@ -25,7 +25,7 @@ from smartshoe.diagnosis._members import (
     members_of,
     start_with,
 )
-from smartshoe.diagnosis._search import best_additions, is_admissible, search, step
+from smartshoe.diagnosis._search import best_additions, best_step, is_admissible, search
 from smartshoe.diagnosis._validation import (
     LeftOut,
     _in_standard_errors,
@@ -84,23 +84,23 @@ def test_additions_are_the_best_shape_of_each_effect_in_order() -> None:
 def test_a_step_adds_drops_or_swaps_for_the_better() -> None:
     candidates = [candidate(f"n{k}") for k in range(9)]
     added: Any = ToldEvidence(candidates, worth(1.0, 7.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert step(added, (0,)).members == (0, 1)
+    assert best_step(added, (0,)).members == (0, 1)
     dropped: Any = ToldEvidence(candidates, worth(*[-1.0] * 9))
-    assert step(dropped, (0, 1)).members in ((0,), (1,))
-    assert step(dropped, ()).members == ()
+    assert best_step(dropped, (0, 1)).members in ((0,), (1,))
+    assert best_step(dropped, ()).members == ()
     # Two that are worth nothing beside each other, each better than the first.
     table = {(0,): 90.0, (1,): 50.0, (2,): 60.0}
     swapped: Any = ToldEvidence(candidates[:3], lambda members: table.get(members, 100.0))
-    assert step(swapped, (0,)).members == (1,)
-    assert step(swapped, (0,), ("n1",)).members == (2,)
+    assert best_step(swapped, (0,)).members == (1,)
+    assert best_step(swapped, (0,), ("n1",)).members == (2,)
     # No more than seven; of eight one may go.
     full: Any = ToldEvidence(candidates, worth(*[1.0] * 9))
-    assert len(step(full, tuple(range(6))).members) == 7
-    assert len(step(full, tuple(range(7))).members) == 7
+    assert len(best_step(full, tuple(range(6))).members) == 7
+    assert len(best_step(full, tuple(range(7))).members) == 7
     # A set that is not allowed is none.
     wrong: Any = ToldEvidence([candidate("a", sign=-1.0), candidate("b")], worth(9.0, -3.0))
     wrong.strengths[0] = np.ones(1)
-    assert step(wrong, (1,)).members == ()
+    assert best_step(wrong, (1,)).members == ()
 
 
 @pytest.mark.parametrize(("barred", "members"), [(5, (0,)), (4, (0, 5))])
@@ -110,7 +110,7 @@ def test_five_are_tried_beside_a_set(monkeypatch: pytest.MonkeyPatch, barred: in
     beside: Any = ToldEvidence(candidates, worth(*(50.0 - k for k in range(12))))
     bad = set(range(1, 1 + barred))
     monkeypatch.setattr(_search, "is_admissible", lambda evidence, found: not bad & set(found.members))
-    assert step(beside, (0,)).members == members
+    assert best_step(beside, (0,)).members == members
 
 
 @pytest.mark.parametrize(("barred", "members"), [(3, (0,)), (2, (3,))])
@@ -122,7 +122,7 @@ def test_three_are_tried_in_each_members_place(
     monkeypatch.setattr(
         _search, "is_admissible", lambda evidence, found: not set(range(1, 1 + barred)) & set(found.members)
     )
-    assert step(evidence, (0,)).members == members
+    assert best_step(evidence, (0,)).members == members
 
 
 def test_a_search_goes_on_while_it_gains() -> None:
@@ -149,7 +149,7 @@ def test_what_is_so_large_that_it_bends_is_taken_by_itself(monkeypatch: pytest.M
             seen.append((evidence, start, banned))
             return first
 
-        monkeypatch.setattr(_state, "step", stepped)
+        monkeypatch.setattr(_state, "best_step", stepped)
         found = _state.linearised_search(model, [], STANDARD, ("z",))
         assert found == (("evidence", 0.5), first if answer == "first" else "all")
         assert seen == [(("evidence", 0.5), (0,), ("z",))]
@@ -223,7 +223,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
         missing = [name for name in sizes if name not in found.model.names]
         return np.array([3.0, 7.0]) + sum((sizes[name] * ways[name] for name in missing), np.zeros(2))
 
-    monkeypatch.setattr(_members, "_left", left)
+    monkeypatch.setattr(_members, "_residuals", left)
     near = [Alternative(name, 1.0) for name in ("orifice_leak", "zero_drift", "delay", "contact_area")]
     monkeypatch.setattr(_members, "alternatives", lambda *given: (Alternative(None, float(given[2])), *near))
     monkeypatch.setattr(
@@ -232,7 +232,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     present = frozenset({"low_loads"})
     monkeypatch.setattr(_members, "excitation_of", lambda *given: SimpleNamespace(tells_apart=present))
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
-    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
+    monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: laws)
     likelihood: Any = SimpleNamespace(sessions=(), thresholds=STANDARD)
     extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0, likelihood=likelihood)
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
@@ -326,7 +326,7 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
         return SimpleNamespace(cost=110.0, model=model)
 
     monkeypatch.setattr(_members, "fit_with", fitted)
-    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
+    monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: [law])
     less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
     one: Any = SimpleNamespace(name="power_law_creep", effect=effect("power_law_creep"))
     extended: Any = SimpleNamespace(cost=100.0, model=MODEL.with_part("power_law_creep"))
@@ -350,7 +350,7 @@ def test_a_law_that_goes_on_to_an_arm_as_no_wall_has_is_weighed_beside_the_arm_t
         return SimpleNamespace(cost=130.0 if only_effect else 40.0, model=end)
 
     monkeypatch.setattr(_members, "fit_with", lambda *_: SimpleNamespace(cost=50.0, model=bent))
-    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
+    monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: [law])
     monkeypatch.setattr(_members, "fit", refitted)
     kept = MODEL.with_part("gain_drift")
     less: Any = SimpleNamespace(model=kept, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))

@@ -24,7 +24,7 @@ from smartshoe.diagnosis._session import (
     Session,
     _cycles,
     _history_after,
-    _rests_levelled,
+    _with_level_rests,
     at_full_rate,
     begins_unloaded,
     kernel,
@@ -244,7 +244,7 @@ def test_each_rest_is_levelled_but_for_what_is_beyond_the_noise() -> None:
     rng = np.random.default_rng(3)
     load = np.concatenate([0.01 * rng.standard_normal(12), np.full(5, 0.8), 0.02 + 0.01 * rng.standard_normal(20)])
     load[30] = -0.2
-    found = _rests_levelled(load, 0.1, 0.03)
+    found = _with_level_rests(load, 0.1, 0.03)
     first, last = load[:12], load[17:]
     near = np.abs(first - np.median(first)) < 0.03
     assert near.sum() > 10
@@ -255,8 +255,8 @@ def test_each_rest_is_levelled_but_for_what_is_beyond_the_noise() -> None:
     assert list(found[12:17]) == [0.8] * 5
     for count, is_levelled in ((10, False), (11, True)):
         few = np.concatenate([np.ones(3), np.resize([0.0, 0.01], count), np.ones(3)])
-        assert bool(np.ptp(_rests_levelled(few, 0.1, 0.5)[3:-3]) == 0.0) is is_levelled
-    assert list(_rests_levelled(np.array([0.1] * 20), 0.1, 0.5)) == [0.1] * 20
+        assert bool(np.ptp(_with_level_rests(few, 0.1, 0.5)[3:-3]) == 0.0) is is_levelled
+    assert list(_with_level_rests(np.array([0.1] * 20), 0.1, 0.5)) == [0.1] * 20
 
 
 def _conditions(load: Array, step_s: float = STEP_S, before: Any = None) -> Conditions:

@@ -41,7 +41,7 @@ class _State:
         return self
 
     @property
-    def start(self) -> str:
+    def fitted_members(self) -> str:
         return self.fitted
 
     @property
@@ -155,7 +155,7 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
     """Of the two likeliest alone the one that follows better; where fewer than two were found nothing is done."""
     worth_of = {"x": 20.0, "y": 5.0}
     begun: Any = SimpleNamespace(
-        start=(), linearisation=None,
+        fitted_members=(), linearisation=None,
         fit=SimpleNamespace(model=SimpleNamespace(names=(), parts=(), relaxing_share=0.1)),
         evidence=SimpleNamespace(posterior=lambda members: members[0]),
     )  # fmt: skip
@@ -280,7 +280,9 @@ def test_evidence_is_weighed_under_the_lower_of_two_noises(monkeypatch: pytest.M
     )
 
     def state(given: str, noise_sd: float, members: int = 1) -> Any:
-        return SimpleNamespace(linearisation=given, evidence=SimpleNamespace(noise_sd=noise_sd), start=(0,) * members)
+        return SimpleNamespace(
+            linearisation=given, evidence=SimpleNamespace(noise_sd=noise_sd), fitted_members=(0,) * members
+        )
 
     for own, others, is_enough in ((2.0, 3.0, False), (3.0, 2.0, False), (3.0, 3.0, True)):
         assert _settling._has_as_much_evidence(state("law", own), state("block", others)) is is_enough
@@ -297,7 +299,7 @@ def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
     ]  # fmt: skip
     evidence: Any = ToldEvidence(candidates, worth(1.0, 6.0, 5.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     state: Any = SimpleNamespace(
-        start=(0,),
+        fitted_members=(0,),
         exceeds_linear_range=True,
         best="best",
         linearisation=evidence.linearisation,
@@ -309,9 +311,9 @@ def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
     ]  # fmt: skip
     state.exceeds_linear_range = False
     assert _settling._trial_sets(state) == ["best"]
-    state.exceeds_linear_range, state.start = True, tuple(range(7))
+    state.exceeds_linear_range, state.fitted_members = True, tuple(range(7))
     assert _settling._trial_sets(state) == ["best"]
-    state.start = (0, 1, 2, 3, 5, 8)
+    state.fitted_members = (0, 1, 2, 3, 5, 8)
     assert len(_settling._trial_sets(state)) > 1
 
 

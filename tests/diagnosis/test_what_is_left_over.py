@@ -20,9 +20,9 @@ from smartshoe.diagnosis._force import (
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, residual_of
-from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating, repeats, slow
+from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating_structure, repeats, slow_structure
 from smartshoe.diagnosis._limits import limit_own_zeros
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
 from smartshoe.diagnosis._scale import Scale
@@ -166,7 +166,7 @@ def test_what_repeats_is_as_large_as_it_is(sessions: list[Session]) -> None:
         residuals.append(bow + 1e-4 * np.random.default_rng(session.index).standard_normal(load.size))
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
-    found = repeating(sessions, residuals, STANDARD)
+    found = repeating_structure(sessions, residuals, STANDARD)
     assert found.rms == pytest.approx(np.sqrt(square / size), rel=0.1)
     assert found.z > 100.0
     # Nine presses of each of four rates, of which two rates press as long; each with each other one.
@@ -188,13 +188,13 @@ def test_what_repeats_in_fast_cycles_counts_for_the_time_that_they_take(sessions
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
     assert square > 0.0
-    assert repeating(sessions, residuals, STANDARD).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
+    assert repeating_structure(sessions, residuals, STANDARD).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
 
 
 def test_the_score_of_noise_that_repeats_by_chance_is_a_normal_deviate(sessions: list[Session]) -> None:
     rng = np.random.default_rng(11)
     scores = [
-        repeating(
+        repeating_structure(
             sessions, [lfilter([1.0], [1.0, -0.9], rng.standard_normal(s.reading.size)) for s in sessions], STANDARD
         ).z
         for _ in range(20)
@@ -205,9 +205,9 @@ def test_the_score_of_noise_that_repeats_by_chance_is_a_normal_deviate(sessions:
 
 def test_nothing_repeats_without_repeats(sessions: list[Session]) -> None:
     single = replace(sessions[0], cycle=np.zeros(sessions[0].reading.size, dtype=np.intp))
-    assert repeating([single], [np.ones(single.reading.size)], STANDARD) == NOTHING
+    assert repeating_structure([single], [np.ones(single.reading.size)], STANDARD) == NOTHING
     short = [replace(s, reading=s.reading[:50], usable=s.usable[:50]) for s in sessions]
-    assert slow(short, [np.ones(50) for _ in short], STANDARD) == NOTHING
+    assert slow_structure(short, [np.ones(50) for _ in short], STANDARD) == NOTHING
 
 
 def test_cycles_with_lacking_samples_are_left_out(sessions: list[Session]) -> None:
@@ -236,10 +236,10 @@ def test_rows_of_a_kind_are_the_residual_along_the_cycle(sessions: list[Session]
 def test_means_of_noise_vary_as_its_own_fast_part_says(sessions: list[Session], colour: float) -> None:
     rng = np.random.default_rng(3)
     noise = [lfilter([1.0], [1.0, -colour], rng.standard_normal(s.reading.size)) for s in sessions]
-    assert abs(slow(sessions, noise, STANDARD).z) < 3.0
+    assert abs(slow_structure(sessions, noise, STANDARD).z) < 3.0
     sines = [3.0 * np.sin(2 * np.pi * s.conditions.time_s / 60.0) for s in sessions]
     wander = [one + sine for one, sine in zip(noise, sines, strict=True)]
-    found = slow(sessions, wander, STANDARD)
+    found = slow_structure(sessions, wander, STANDARD)
     assert found.z > 3.0
     assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=0.25)
     blocks = sum(int(s.conditions.time_s[-1] / STANDARD.lasting_s) for s in sessions)
@@ -250,7 +250,7 @@ def test_a_jump_in_one_block_makes_it_no_loud_noise(sessions: list[Session]) -> 
     session = sessions[0]
     noise = 1e-3 * np.random.default_rng(5).standard_normal(session.reading.size)
     stepped = noise + 0.01 * (session.conditions.time_s > 0.5 * session.conditions.time_s[-1])
-    assert slow([session], [stepped], STANDARD).z > 10.0
+    assert slow_structure([session], [stepped], STANDARD).z > 10.0
 
 
 def test_what_is_beyond_white_noise_is_the_rest_of_the_power(sessions: list[Session]) -> None:
@@ -404,7 +404,7 @@ def test_correlation_is_not_looked_for_across_what_lacks() -> None:
     kept = np.ones(white.size, dtype=bool)
     kept[5000:9000] = False
     spoilt = np.where(kept, 2.0 + white, 400.0)
-    assert correlated_sd([spoilt, white], [kept, np.zeros(white.size, dtype=bool)]) == pytest.approx(1.0, rel=0.1)
+    assert effective_noise_sd([spoilt, white], [kept, np.zeros(white.size, dtype=bool)]) == pytest.approx(1.0, rel=0.1)
 
 
 @pytest.fixture(scope="module")

@@ -57,7 +57,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
         can_validate=True, refused=(), cancelling_names=(), best_single=None, screening=SCREENING,
-        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest=None,
+        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest_law=None,
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size, kinds[2].sd_of_mean = "memory", 0.07, lambda lasts_s: ("wanders", lasts_s)
@@ -94,10 +94,10 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         return SimpleNamespace(name=name.name, size=made.sizes[name.name], rivals=(f"rival of {name.name}",))
 
     answer("prepared", given)
-    answer("inferred", found)
+    answer("infer_with_gas_check", found)
     answer("residual_of", lambda session, model: f"{getattr(session, 'name', session)} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
-    answer("repeating", lambda fine, left, thresholds: (fine, left))
+    answer("repeating_structure", lambda fine, left, thresholds: (fine, left))
     answer("names_of", lambda *_: tuple(made.names))
     answer("reason_of_another_kind", lambda name, *_: "it turned" if name.name == "turned" else None)
     answer("zeros_of", lambda *_: tuple(made.zeros))
