@@ -128,4 +128,5 @@ def _fitted_fully(few: Iterable[Fit]) -> list[Fit]:
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:
+    """``model`` without effects of wall and gas, which may add arms."""
     return model.without(*(part.name for part in model.parts if isinstance(part.effect, CoreEffect)))

@@ -57,6 +57,7 @@ class _Strokes:
 
 
 def _strokes_of(recording: Recording, thresholds: Thresholds) -> _Strokes | None:
+    """The samples of a recording with one load and one sensor; None where there are too few, or nothing moves."""
     if not recording.of_role("load") or len(recording.sensors) != 1:
         return None
     load, sensor = recording.load, recording.sensor
@@ -158,6 +159,7 @@ def _line_of(columns: Array, strokes: _Strokes) -> Array:
 
 
 def _friction(found: Branches, thresholds: Thresholds) -> str | None:
+    """The sentence on friction, where the branches are reproducible and do not fade; else None."""
     if not _is_reproducible(found.recording, thresholds) or _fades(found, thresholds):
         return None
     sensor = found.recording.sensor
@@ -251,13 +253,16 @@ def conductance_of(recordings: Sequence[Recording], thresholds: Thresholds) -> s
 
 
 def _by_line(x: Array, y: Array) -> float:
+    """Share of the variance of ``y`` that a line of ``x`` explains."""
     return float(np.corrcoef(x, y)[0, 1]) ** 2
 
 
 def _explained(values: Array, by: Array) -> float:
+    """Share of the variance of ``values`` that a prediction ``by`` explains."""
     whole = float(np.var(values))
     return 1.0 - float(np.var(values - by)) / whole if whole > 0 else 0.0
 
 
 def _slope(place: Array, level: Array, among: Mask) -> float:
+    """Slope of ``level`` over ``place``, by least squares ``among`` the bins."""
     return float(np.polyfit(place[among], level[among], 1)[0])

@@ -376,6 +376,7 @@ class Evidence:
         return self._extensions[best.members]
 
     def _extended(self, best: Posterior) -> list[tuple[float, int, Array]]:
+        """`extensions` of one set, in groups of candidates with equally many columns."""
         index, sds = self._columns_and_sds(best.members, best.strengths)
         factor, solution, _ = self._solve(index, sds)
         cross_terms = sds[:, None] * self._reduced[index, : self._sds.size + 1]

@@ -177,6 +177,7 @@ class _Rise(NamedTuple):
 
 
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
+    """The rises of a session's load that count as load cycles."""
     load, step_s = session.conditions.load, session.conditions.step_s
     lowest, span = float(load.min()), min(1.0, max(float(np.ptp(load)), 1e-9))
     for first, last in rises_of(load, thresholds.cycle * span):
@@ -265,6 +266,7 @@ def _inner_runs(mask: Mask) -> Mask:
 
 
 def _run_lengths(mask: Mask) -> list[int]:
+    """The lengths of the runs of True, in samples."""
     first, last = runs_of(mask)
     return [int(n) for n in last - first]
 
@@ -277,6 +279,7 @@ def _longest_read_s(session: Session, mask: Mask) -> float:
 
 
 def _distinct(values: Sequence[float], alike: float) -> list[float]:
+    """The values of which each exceeds the one before by more than a share ``alike``."""
     found: list[float] = []
     for value in sorted(values):
         if not found or value > found[-1] * (1.0 + alike):

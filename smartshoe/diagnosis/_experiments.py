@@ -144,6 +144,7 @@ def sessions_on(
 
 
 def _press(load_n: float, hold_s: float, rest_s: float, peak_n: float) -> list[Segment]:
+    """A rest, a ramp to a load, a hold, a ramp down, and a rest; the rate is the same for every load."""
     ramp_s = 4.0 * load_n / peak_n
     return [
         Segment("rest", 0.0, 3.0),
@@ -155,5 +156,6 @@ def _press(load_n: float, hold_s: float, rest_s: float, peak_n: float) -> list[S
 
 
 def _triangle(load_n: float, rest_s: float, peak_n: float | None = None) -> list[Segment]:
+    """A ramp up, a ramp down, and a rest; the rate is the same for every load of one ``peak_n``."""
     ramp_s = 3.0 * load_n / (peak_n or load_n)
     return [Segment("ramp", load_n, ramp_s), Segment("ramp", 0.0, ramp_s), Segment("rest", 0.0, rest_s)]

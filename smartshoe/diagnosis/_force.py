@@ -236,6 +236,7 @@ def _force_error_n(session: Session, model: ExtendedModel) -> Array:
 
 
 def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:
+    """The compensator of ``model`` at a session's rate; ``started_s`` is its clock at the start."""
     return ExtendedCompensator(model, 1.0 / session.conditions.step_s, started_s=started_s)
 
 

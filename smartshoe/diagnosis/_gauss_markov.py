@@ -85,6 +85,7 @@ class GaussMarkov:
 
     @property
     def _deviations(self) -> float:
+        """The deviation, in standard deviations, that counts as beyond chance."""
         return largest_of_noise(1, self.thresholds)
 
 

@@ -46,6 +46,7 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
+        """Whether noise hardly reaches this score, by Student's t."""
         return self.pairs > 1 and self.z > self._largest_of_noise
 
     def would_detect(self, rms: float) -> bool:
@@ -54,6 +55,7 @@ class LackOfFit:
 
     @property
     def _largest_of_noise(self) -> float:
+        """The score that noise reaches with the probability of a false alarm."""
         return -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
 
 
@@ -145,6 +147,7 @@ class _LoadCycle(NamedTuple):
 
     @property
     def duration_s(self) -> float:
+        """The time in s under load."""
         return (self.size - 1) * self.step_s
 
     def row(self, rest_s: float, at_rest: int) -> Array:

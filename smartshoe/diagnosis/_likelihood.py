@@ -115,6 +115,7 @@ class Likelihood:
         return self._last[1] if self._last is not None and self._last[0] is model else None
 
     def _products(self, model: ExtendedModel) -> tuple[float, Array, Array]:
+        """`normal` from the rows as they are now."""
         self._update_nuisances(model, [rows[:, 0] for rows in self._rows])
         total = np.sum([self._with_memory(k, rows, model) for k, rows in enumerate(self._rows)], axis=0)
         self._scales = np.diag(total)[1:]
@@ -247,6 +248,7 @@ class _Prior:
 
 
 def _stepped(theta: Array, logarithmic: Mask) -> Array:
+    """(p,) theta as it is stepped: logarithms where ``logarithmic``."""
     return np.where(logarithmic, np.log(np.where(logarithmic, np.abs(theta) + 1e-300, 1.0)), theta)
 
 
@@ -285,6 +287,7 @@ def _bounded_step(
 
 
 def _inverse(normal: Array) -> Array:
+    """(p, p) pseudo-inverse of a normal matrix, scaled; 0 for parameters without influence."""
     scale = np.sqrt(np.diag(normal))
     out = np.zeros_like(normal)
     index = np.flatnonzero(scale > 0)

@@ -58,6 +58,7 @@ def limit_clocks_disagree(
 
 
 def _late(lag_s: float) -> str:
+    """A lag in words."""
     return f"{abs(lag_s):.3g} s {'late' if lag_s >= 0.0 else 'early'}"
 
 
@@ -359,6 +360,7 @@ def limit_zero_jumps(changes: Sequence[ZeroChange]) -> list[str]:
 
 
 def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
+    """The first few changes in words, and the number of the others."""
     few = [f"by {percent(one.share, signed=True)} {time_of(one)} in {one.recording}" for one in changes[:SAID]]
     return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 

@@ -376,6 +376,7 @@ def _with_offset(
 
 
 def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:
+    """A model's goodness of fit in the reading's unit; None where nothing was judged."""
     if found.is_empty:
         return None
     span = abs(scale.reading)
@@ -390,6 +391,8 @@ def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Sca
 
 
 def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, scale: Scale) -> Trace:
+    """A recording with both simulations, own terms included, in the reading's unit and N."""
+
     def told(shares: Array) -> Array:
         return np.asarray(scale.zero + shares * scale.reading)
 

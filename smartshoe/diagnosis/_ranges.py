@@ -158,10 +158,12 @@ def _near(one: float, other: float, same: float) -> bool:
 
 
 def _fastest(one: Session, seen: Mask) -> float:
+    """The fastest rate (99th percentile) of a session's load where ``seen``, full scales per second."""
     return float(np.quantile(np.abs(one.conditions.rate_per_s[seen]), 0.99))
 
 
 def _highest(one: Session, seen: Mask) -> float:
+    """The highest load of a session where ``seen``, in full scales."""
     return float(one.conditions.load[seen].max())
 
 

@@ -75,6 +75,7 @@ class ResidualStructure:
 
     @property
     def _significant_rms(self) -> list[float]:
+        """The rms of each significant test, shares of full scale."""
         if self.memory is not None and self.memory.is_noise:
             return [self.repeating.rms] if self.repeating.significant else []
         found = [one.rms for one in (self.repeating, self.slow) if one.significant]

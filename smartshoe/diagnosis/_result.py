@@ -304,6 +304,7 @@ class Diagnosis(Summarised):
 
     @property
     def _sample_rate_hz(self) -> float:
+        """The sample rate of the first recording."""
         from smartshoe.calibration.provenance import without_rounding
 
         return without_rounding(sample_rate_of(self.traces[0].time_s))

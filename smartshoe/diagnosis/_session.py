@@ -242,6 +242,7 @@ def _session(
     thresholds: Thresholds,
     template: Session | None = None,
 ) -> Session:
+    """The session of one recording, thinned by ``factor``; cycles, held-out parts and noise those of a ``template``."""
     step_s = recording.sample_time_s
     logged = _logged(
         recording,
@@ -325,6 +326,7 @@ def longest_step_s(recording: Recording, factor: int) -> float:
 
 
 def _logged(recording: Recording, usable: Mask, scale: Scale, longest_s: float, thresholds: Thresholds) -> _Logged:
+    """The recording on an even grid; samples are usable up to ``longest_s`` apart."""
     time_s, step_s = recording.time_s - recording.time_s[0], recording.sample_time_s
     known = recording.load.present
     good = usable & recording.sensor.present & known
@@ -357,6 +359,7 @@ def _load_at_rest(load: Array, reading: Array, step_s: float, unit: Unit, thresh
 
 
 def _denoised_load(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> DenoisedLoad:
+    """The load (n,) without noise and with the reading's sampling jitter, both in shares of full scale."""
     raw_sd = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
     denoised, remaining_sd = without_noise(load, step_s, raw_sd, thresholds)
     return DenoisedLoad(with_sampling_jitter(denoised, reading, step_s, thresholds), raw_sd, remaining_sd)
@@ -428,6 +431,8 @@ def have_later_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> bo
 
 
 def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
+    """The number of rises of the load; cached in the conditions."""
+
     def count() -> Array:
         load = conditions.load
         return np.array([len(rises_of(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9)))])
@@ -436,6 +441,7 @@ def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
 
 
 def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
+    """(n,) number of the load cycle; of equal parts of the time where there are too few cycles to hold some out."""
     load = conditions.load
     # A share of full scale, or of the record's own span where that is smaller.
     threshold = thresholds.cycle * min(1.0, max(float(np.ptp(load)), 1e-9))
@@ -458,6 +464,7 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
 
 
 def _history_after(conditions: Conditions, thresholds: Thresholds) -> _History:
+    """The history that a session leaves to the one that continues it."""
     load = conditions.load
     before = conditions.before
     sums = {

@@ -33,6 +33,7 @@ class Spacing:
         return self._between(good) & ~self.is_close
 
     def _between(self, good: Mask) -> Mask:
+        """(m,) moments between two ``good`` samples (n,) that are not in a gap."""
         return self.is_even & good[self.after] & good[self.after - 1]
 
 

@@ -111,6 +111,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
 
 
 def _load_stands_still(recording: Recording, standing: float) -> Literal["absent", "still"] | None:
+    """Whether the load is "absent" or "still", within ``standing`` of its size; None where it moves."""
     loads = recording.of_role("load")
     if not loads:
         return "absent"
@@ -171,6 +172,8 @@ def _guess(t: Array, v: Array, high: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Fitted:
+    """Parameters ``at`` the optimum, their standard deviations, and the sum of squares."""
+
     at: Array
     sd: Array
     square: float
@@ -201,10 +204,12 @@ def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list
 
 
 def _exponential(at: Array, t: Array) -> Array:
+    """``at`` holds the initial value and the time constant."""
     return np.asarray(at[0] * np.exp(-t / max(at[1], 1e-9)))
 
 
 def _to_plateau(at: Array, t: Array) -> Array:
+    """An exponential towards the third value of ``at``."""
     return _exponential(at[:2], t) + float(at[2])
 
 
@@ -218,6 +223,7 @@ def _of_order(at: Array, t: Array) -> Array:
 
 
 def _duration(time_s: float) -> str:
+    """A time in words, in s, min or h."""
     for limit_s, unit_s, name in ((600.0, 1.0, "s"), (7200.0, 60.0, "min")):
         if time_s < limit_s:
             return f"{time_s / unit_s:.3g} {name}"
@@ -225,6 +231,7 @@ def _duration(time_s: float) -> str:
 
 
 def _course_says(course: Course, order: float | None) -> str:
+    """The law of the decay in words."""
     if course == "undecided" or order is None:
         return "were it to fall to zero (too little is lost to say by which law)"
     if course == "exponential":
