@@ -245,20 +245,23 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     linearisation, evidence, best, extended = state.linearisation, state.evidence, state.best, state.fit
     likelihood, plain_error = state.likelihood(), error_of(sessions, plain.model)
     left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
-    whole = fit_of_set(state, best, likelihood)
-    extended = left_out.consistent(whole)
-    refused = [name for name in whole.model.names if name not in extended.model.names]
+    fitted = fit_of_set(state, best, likelihood)
+    extended = left_out.consistent(fitted)
+    refused = [name for name in fitted.model.names if name not in extended.model.names]
     best = evidence.posterior(tuple(m for m in best.members if linearisation.candidates[m].name not in refused))
     cancelling_names = cancelling_effects(sessions, extended.model, state.thresholds)
     if cancelling_names:
-        less = {name: fit(likelihood, extended.model.without(name)) for name in cancelling_names}
-        idle = min(cancelling_names, key=lambda name: less[name].cost)
-        if error_of(sessions, less[idle].model) ** 2 > state.thresholds.clear * error_of(sessions, extended.model) ** 2:
+        without = {name: fit(likelihood, extended.model.without(name)) for name in cancelling_names}
+        idle = min(cancelling_names, key=lambda name: without[name].cost)
+        if (
+            error_of(sessions, without[idle].model) ** 2
+            > state.thresholds.clear * error_of(sessions, extended.model) ** 2
+        ):
             cancelling_names = []  # each is needed, although they cancel in part
-        elif not cancelling_effects(sessions, less[idle].model, state.thresholds):
+        elif not cancelling_effects(sessions, without[idle].model, state.thresholds):
             cancelling_names = []
             refused.append(idle)
-            extended = less[idle]
+            extended = without[idle]
     while (beyond := extrapolating_effect(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         extended = fit(likelihood, extended.model.without(beyond))
@@ -267,11 +270,11 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     while extra and (
         error_of(sessions, extended.model) >= plain_error or not left_out.is_validated(extended.model, plain.model)
     ):
-        less = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
-        worst = min(extra, key=lambda name: float(left_out.errors(less[name].model).sum()))
+        without = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
+        worst = min(extra, key=lambda name: float(left_out.errors(without[name].model).sum()))
         refused.append(worst)
         extra.remove(worst)
-        extended = less[worst]
+        extended = without[worst]
     extended = extended if extra else evaluated(likelihood, plain.model)  # the plain fit has its own noise level
     kept_names = extended.model.names
     if refused and kept_names:
@@ -317,8 +320,8 @@ def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple
     For example a lag and a delay, of which either suffices: side by side each is too small to be named.
     """
     members = found.members()
-    while (less := _redundant(members, plain, found.evidence.thresholds)) is not None:
-        refitted = fit(found.fit.likelihood, less.without.model)
+    while (redundant := _redundant(members, plain, found.evidence.thresholds)) is not None:
+        refitted = fit(found.fit.likelihood, redundant.without.model)
         evidence, best = evidence_about(refitted.model, found.evidence)
         found = replace(found, fit=refitted, evidence=evidence, best=best)
         members = found.members()

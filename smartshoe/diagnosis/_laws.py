@@ -53,9 +53,9 @@ def likelier_changes(found: Fit, evidence: Evidence, members: Sequence[Member]) 
     for one in members:
         if any(a.effect is None and a.margin < 0.0 for a in one.alternatives):
             tried.append(one.without)
-        most = evidence.thresholds.law_departure**2 * max(one.fall, 0.0)
+        max_margin = evidence.thresholds.law_departure**2 * max(one.fall, 0.0)
         if not one.effect.why_unnamed:  # a behaviour without a law has been compared with those that come near
-            tried += [a.fit for a in one.laws if a.fit is not None and a.margin < most]
+            tried += [a.fit for a in one.laws if a.fit is not None and a.margin < max_margin]
         other = _nearest_of_another_kind(one, found.model)
         if other is None or one.size <= evidence.thresholds.tolerable:
             continue
@@ -67,21 +67,21 @@ def likelier_changes(found: Fit, evidence: Evidence, members: Sequence[Member]) 
     has_curve = any(one.effect.is_memoryless for one in members)
     if not (tried or has_curve):
         return
-    about, own = evidence_about(found.model, evidence)
+    about, own_posterior = evidence_about(found.model, evidence)
     if has_curve:
-        tried += _with_another_curve(found, about, own, members)
+        tried += _with_another_curve(found, about, own_posterior, members)
         tried = [*_with_distinct_branches(tried, about.linearisation.candidates)]
     changed = []
     for fitted in tried:
-        if evidence_about(fitted.model, evidence, about.linearisation)[1].score >= own.score:
+        if evidence_about(fitted.model, evidence, about.linearisation)[1].score >= own_posterior.score:
             continue  # a rough score, by which most are ruled out
         anew, best = evidence_about(fitted.model, evidence)
-        if own.score - best.score >= evidence.odds:
+        if own_posterior.score - best.score >= evidence.odds:
             changed.append(State(anew, best, fitted))
     yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
 
 
-def _with_another_curve(found: Fit, about: Evidence, own: Posterior, members: Sequence[Member]) -> list[Fit]:
+def _with_another_curve(found: Fit, about: Evidence, own_posterior: Posterior, members: Sequence[Member]) -> list[Fit]:
     """Fits with one more curve of another branch, where the linearisation does not speak against it.
 
     The search allows one curve in a set, since curves bend for each other: only fits of both can tell, also beside the
@@ -89,26 +89,26 @@ def _with_another_curve(found: Fit, about: Evidence, own: Posterior, members: Se
     one. The second curve must gain more than the square of the usual departure explains.
     """
     candidates = about.linearisation.candidates
-    there = [candidates[m] for m in own.members]
-    slots, branches = {one.slot for one in there}, {one.branch for one in there}
+    present = [candidates[m] for m in own_posterior.members]
+    slots, branches = {one.slot for one in present}, {one.branch for one in present}
     shapes: dict[Effect, list[Mapping[str, float]]] = {}
-    for score, k, strengths in sorted(about.extensions(own.members), key=lambda extension: extension[0]):
+    for score, k, strengths in sorted(about.extensions(own_posterior.members), key=lambda extension: extension[0]):
         one = candidates[k]
-        if score >= own.score or one.effect.is_flexible or not has_physical_sign(about, k, strengths):
+        if score >= own_posterior.score or one.effect.is_flexible or not has_physical_sign(about, k, strengths):
             continue
         if one.slot in slots and one.branch not in branches:
             shapes.setdefault(one.effect, []).append(one.shape)
     curves = [one for one in members if one.effect.is_memoryless]
-    beside = [] if any(one.effect.is_flexible for one in curves) else [found]
-    beside += [a.fit for one in curves for a in one.laws[:RIVALS] if a.fit is not None]
+    bases = [] if any(one.effect.is_flexible for one in curves) else [found]
+    bases += [a.fit for one in curves for a in one.laws[:RIVALS] if a.fit is not None]
     tried = [
         (one, fit_with(law, one.model, found.likelihood, few[:RIVALS]))
         for law, few in shapes.items()
-        for one in beside
+        for one in bases
         if law.name not in one.model.names
     ]
-    least = about.thresholds.departure**4 * max(one.fall for one in curves)
-    return [both for one, both in tried if one.cost - both.cost > least]
+    min_fall = about.thresholds.departure**4 * max(one.fall for one in curves)
+    return [both for one, both in tried if one.cost - both.cost > min_fall]
 
 
 def _with_distinct_branches(fits: Sequence[Fit], candidates: Sequence[Candidate]) -> Iterator[Fit]:
@@ -132,20 +132,22 @@ def _law_of(
     """The law that follows a flexible block of ``about`` nearly as well, and the share of the block that it misses."""
     thresholds, is_curve = state.thresholds, block.effect.is_memoryless
     bare = about.without(block.name, *(part.name for part in about.parts if is_curve and part.effect.is_memoryless))
-    nothing = fit(likelihood, bare, FEW_STEPS)
+    without_block = fit(likelihood, bare, FEW_STEPS)
     flexible = evaluated(likelihood, about).cost
-    explained = min(nothing.cost, likelihood.cost(plain)) - flexible
+    explained = min(without_block.cost, likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
     for law in available_effects(likelihood.sessions, thresholds):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
             continue
         # A law that is already beside the block may do without it.
-        one = nothing if law.name in bare.names else fit_with(law, nothing.model, likelihood, other_arm=bare)
+        one = (
+            without_block if law.name in bare.names else fit_with(law, without_block.model, likelihood, other_arm=bare)
+        )
         # A law of another family is a further name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
-        most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
+        max_missed = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
         missed = (one.cost + other - flexible) / max(explained, other, 1e-9)
-        if missed < most**2:
+        if missed < max_missed**2:
             misses.append((missed, one))
     return min(misses, key=lambda pair: pair[0]) if misses else None
 

@@ -60,32 +60,34 @@ def names_of(
     at most. Flexible blocks, and curves at the end of their kind, carry the name of the nearest law; no name is given
     twice.
     """
-    likely = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
-    likely = [_with_confounded(name, thresholds) for name in likely]
+    named = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
+    named = [_with_confounded(name, thresholds) for name in named]
     is_bent = any(one.bends_too_little for one in members)
-    likely = [
+    named = [
         capped_at_half(name)
         if is_unsteady
         or (is_clocked and name.effect.goes_with_the_clock)
         or (is_bent and not name.member.effect.is_memoryless)
         else name
-        for name in likely
+        for name in named
     ]
     # A block named after a law that is in the model itself is only that law's departure: one name.
     first: dict[str, Name] = {}
-    for one in sorted(likely, key=lambda one: (one.is_sure, one.member.size), reverse=True):
+    for one in sorted(named, key=lambda one: (one.is_sure, one.member.size), reverse=True):
         first.setdefault(one.effect.name, one)
-    likely = [one for one in likely if first[one.effect.name] is one]
-    found = {one.effect.name for one in likely}  # an effect that is in the model is no equivalent of another
-    likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
+    named = [one for one in named if first[one.effect.name] is one]
+    found = {one.effect.name for one in named}  # an effect that is in the model is no equivalent of another
+    named = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in named]
     odds = thresholds.equivalent_odds
-    possible = [one for one in likely if one.kind_probability > odds * (1.0 - one.kind_probability)]
-    if sure := [one for one in likely if one.is_sure]:
+    possible = [one for one in named if one.kind_probability > odds * (1.0 - one.kind_probability)]
+    if sure := [one for one in named if one.is_sure]:
         is_firm = not all(one.kind_only for one in sure)  # not beside a kind that no law follows
         max_departure = thresholds.departure * math.hypot(*(one.member.size for one in sure))
-        beside = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
-        beside = [one for one in beside if confidence_of(one, thresholds) > 0.5 or one.member.size > max_departure]
-        return tuple(one for one in likely if one in sure or one in beside)
+        companions = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
+        companions = [
+            one for one in companions if confidence_of(one, thresholds) > 0.5 or one.member.size > max_departure
+        ]
+        return tuple(one for one in named if one in sure or one in companions)
     if larger := [one for one in possible if one.member.size > residual_rms]:
         return tuple(capped_at_half(one) for one in larger)
     if best_single is None:
@@ -102,19 +104,17 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
     if law_in_place is not None and law_in_place.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: its rivals are compared with that law.
         followed = catalogue()[str(law_in_place.effect)]
-        kin = _other_laws_of_family(followed) or tuple(
-            str(a.effect) for a in one.laws if a is not law_in_place
-        )  # of a curve all other curves
-        beside = tuple(replace(a, margin=a.margin - law_in_place.margin) for a in one.laws if a.effect in kin)
-        as_law = replace(one, laws=beside, fall=one.fall - law_in_place.margin)
+        # A curve that is alone in its kind has all other curves as rivals.
+        kin = _other_laws_of_family(followed) or tuple(str(a.effect) for a in one.laws if a is not law_in_place)
+        other_laws = tuple(replace(a, margin=a.margin - law_in_place.margin) for a in one.laws if a.effect in kin)
+        as_law = replace(one, laws=other_laws, fall=one.fall - law_in_place.margin)
         return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, law_in_place)
     if not (one.effect.is_flexible or one.is_any_curve):
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if law_in_place is None else catalogue()[str(law_in_place.effect)]
-    others = dict.fromkeys(
-        (*_other_laws_of_family(nearest), *(str(a.effect) for a in one.laws))
-    )  # of a curve all other curves
+    # The laws fitted in its place are of the family, or for a curve all other curves.
+    others = dict.fromkeys((*_other_laws_of_family(nearest), *(str(a.effect) for a in one.laws)))
     others.pop(nearest.name, None)
     # A law that follows less than half of it is no equivalent.
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}

@@ -79,38 +79,42 @@ def diagnosed(
     sessions, fine, scale = given.sessions, given.fine, given.scale
     found = infer_with_gas_check(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
-    left = _residuals_of(found, given, integrity.faults)
-    named = _named_causes(found, given, left)
-    held = _with_held_drifts(found.fit.model, named, sessions)
-    if held is not found.fit.model:  # the fit, and what the names rest on, stay as they were
-        found = replace(found, fit=replace(found.fit, model=held))
-        after, _, residuals_after = _structure_left_by(held, given)
-        left = replace(left, after=after, residuals_after=residuals_after)
-    plain = replace(found.baseline.model, noise=fitted_rms(fine, left.residuals_before))
-    extended = replace(found.fit.model, noise=fitted_rms(fine, left.residuals_after))
+    structures = _structures_of(found, given, integrity.faults)
+    named = _named_causes(found, given, structures)
+    with_drifts_held = _with_held_drifts(found.fit.model, named, sessions)
+    if with_drifts_held is not found.fit.model:  # the fit, and what the names rest on, stay as they were
+        found = replace(found, fit=replace(found.fit, model=with_drifts_held))
+        after, _, residuals_after = _structure_left_by(with_drifts_held, given)
+        structures = replace(structures, after=after, residuals_after=residuals_after)
+    plain = replace(found.baseline.model, noise=fitted_rms(fine, structures.residuals_before))
+    extended = replace(found.fit.model, noise=fitted_rms(fine, structures.residuals_after))
     baseline, best = errors(fine, plain), errors(fine, extended)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
-    is_told = found.zero_changes or found.own_gains or given.is_no_unit
-    own_zero_offsets = None if is_told else own_zeros(sessions, found.fit.model, thresholds)
+    skips_own_zeros = found.zero_changes or found.own_gains or given.is_no_unit
+    own_zero_offsets = None if skips_own_zeros else own_zeros(sessions, found.fit.model, thresholds)
     causes += [zero_cause_of(zero, best, scale, thresholds, own_zero_offsets is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     gained = gain(baseline, best, scale, thresholds)
-    outcome = _outcome(found, given, left, named, causes, gained)
-    adopted = _Adopted(found.fit, extended, best, left.after)
-    if (
-        gained.is_rejected
-    ):  # the only decision that held-out data makes: an extension that is worse there is not adopted
-        adopted = _Adopted(found.baseline, plain, baseline, left.before)
-    verdict, rest = outcome.verdict, unexplained_of(causes, left.before, adopted.left)
-    of_held_out = held_out_rms(fine, left.residuals_after, thresholds)
+    outcome = _outcome(found, given, structures, named, causes, gained)
+    adopted = _Adopted(found.fit, extended, best, structures.after)
+    # The only decision that held-out data makes: an extension that is worse there is not adopted.
+    if gained.is_rejected:
+        adopted = _Adopted(found.baseline, plain, baseline, structures.before)
+    verdict, rest = outcome.verdict, unexplained_of(causes, structures.before, adopted.left)
+    of_held_out = held_out_rms(fine, structures.residuals_after, thresholds)
     # Noise is at most what is not structure, and what fitted data has beside its own structure: what a model fails to
     # predict is not noise for that. What is white in held-out data is noise in any case.
-    structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
-    no_more = min(best.rmse**2 - structure**2, extended.noise**2 - left.within.rms**2)
+    structure = of_held_out if outcome.unproven else min(max(structures.after.rms, outcome.elsewhere), of_held_out)
+    no_more = min(best.rmse**2 - structure**2, extended.noise**2 - structures.within.rms**2)
     noise_variance = max(best.rmse**2 - of_held_out**2, no_more, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
-        fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
+        fine,
+        extended,
+        integrity.faults,
+        explained or structures.after.is_noise,
+        thresholds.material,
+        structures.within.memory,
     )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
@@ -119,7 +123,7 @@ def diagnosed(
     # What no compensator undoes, for example the room's warmth, goes into its zero, averaged over recordings.
     zeros_apart = abs(force.zero - mean_offset(force.fine, force.model))
     has_own = bool(force.passed_over) or zeros_apart >= thresholds.material
-    of_force = _limits_of_the_force(found, given, named, extended, force, outcome, left, own_zero_offsets)
+    of_force = _limits_of_the_force(found, given, named, extended, force, outcome, structures, own_zero_offsets)
     says = sentence_of(
         verdict,
         names_in(causes, len(minor)),
@@ -140,7 +144,7 @@ def diagnosed(
         causes=tuple(causes),
         minor=minor,
         data_faults=(*integrity.faults, *noise),
-        baseline=_goodness(baseline, force.before.held_out_n, left.before, scale),
+        baseline=_goodness(baseline, force.before.held_out_n, structures.before, scale),
         extended=_goodness(adopted.errors, force.error.held_out_n, adopted.left, scale),
         gain=None if best.is_empty else gained,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
@@ -177,7 +181,7 @@ class _Adopted:
 
 
 @dataclass(frozen=True, eq=False)
-class _Residuals:
+class _Structures:
     """The residual structure of the plain model, ``before`` effects, and of the extended one, ``after``.
 
     ``within`` is that of fitted data only. ``fault_error`` is the rms that data faults add, a share of full scale.
@@ -193,13 +197,13 @@ class _Residuals:
     residuals_after: Sequence[Array]
 
 
-def _residuals_of(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _Residuals:
+def _structures_of(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _Structures:
     """The residual structures of the baseline and of the extended model."""
     sessions = given.sessions
     before, _, residuals_before = _structure_left_by(found.baseline.model, given)
     after, residuals, residuals_after = _structure_left_by(found.fit.model, given)
     within = _structure_where_fitted(sessions, residuals, given.thresholds)
-    return _Residuals(
+    return _Structures(
         before, after, within, fault_rms(faults, sessions, given.scale), residuals_before, residuals_after
     )
 
@@ -216,10 +220,10 @@ def _is_silent(found: Inference, given: Prepared) -> bool:
     return given.is_no_unit or not found.can_validate
 
 
-def _named_causes(found: Inference, given: Prepared, left: _Residuals) -> NamedCauses:
+def _named_causes(found: Inference, given: Prepared, structures: _Structures) -> NamedCauses:
     """The causes among what was ``found``."""
-    most = max(left.within.rms, left.within.size)
-    residual_sd = left.within.sd_of_mean(given.thresholds.hold_s)
+    most = max(structures.within.rms, structures.within.size)
+    residual_sd = structures.within.sd_of_mean(given.thresholds.hold_s)
     zeros = [] if _is_silent(found, given) else _material_zeros(found, given, most, residual_sd)
     return causes_among(found, given, zeros, most)
 
@@ -250,20 +254,25 @@ class _Outcome:
 def _outcome(
     found: Inference,
     given: Prepared,
-    left: _Residuals,
+    structures: _Structures,
     named: NamedCauses,
     causes: Sequence[Cause],
     gained: Gain,
 ) -> _Outcome:
-    """The verdict, from the structures ``left`` and what is ``gained`` on held-out data."""
-    fine, off, fault_error, thresholds = given.fine, left.residuals_after, left.fault_error, given.thresholds
-    within = max(left.within.size, beyond_noise(fine, off, thresholds), fault_error)
+    """The verdict, from the structures ``structures`` and what is ``gained`` on held-out data."""
+    fine, off, fault_error, thresholds = (
+        given.fine,
+        structures.residuals_after,
+        structures.fault_error,
+        given.thresholds,
+    )
+    within = max(structures.within.size, beyond_noise(fine, off, thresholds), fault_error)
     elsewhere = held_out_excess(fine, off, within, thresholds)
     unproven = 0.0
-    if not (found.can_validate and left.after.is_tested):
+    if not (found.can_validate and structures.after.is_tested):
         # Beside causes the remainder is compared with what was wrong, tested or not.
-        before = left.residuals_before if found.can_validate and causes else None
-        unproven = untested_rms(fine, off, left.after, thresholds, fault_error, before)
+        before = structures.residuals_before if found.can_validate and causes else None
+        unproven = untested_rms(fine, off, structures.after, thresholds, fault_error, before)
     if given.is_no_unit:  # a reading that follows something other than the load is no unit's, however well it fits
         return _Outcome("unexplained", gained, elsewhere, unproven)
     # An unsure companion of a sure cause does not mean that there is no law.
@@ -274,7 +283,7 @@ def _outcome(
     besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, certain_fall) if one > least))
     worse = gained.is_loss or gained.growth(given.scale) > thresholds.tolerable
     verdict = verdict_of(
-        causes, left.before, left.after, thresholds, is_lawful, fault_error, worse=worse, elsewhere=besides
+        causes, structures.before, structures.after, thresholds, is_lawful, fault_error, worse=worse, elsewhere=besides
     )
     return _Outcome(verdict, gained, elsewhere, unproven)
 
@@ -286,7 +295,7 @@ def _limits_of_the_force(
     extended: ExtendedModel,
     force: Compensation,
     outcome: _Outcome,
-    left: _Residuals,
+    structures: _Structures,
     own_zero_offsets: OwnZeros | None,
 ) -> tuple[str, ...]:
     """What limits a calibration's force: loads beyond the fitted ones, effects that are not undone, zeros, gains."""
@@ -295,7 +304,11 @@ def _limits_of_the_force(
     undone = extended if force.is_plain else force.model
     return (
         *([limit_rejected(gained, ways)] if gained.is_rejected else []),
-        *([limit_held_out_excess(elsewhere, left.within.size, ways)] if elsewhere and not gained.is_rejected else []),
+        *(
+            [limit_held_out_excess(elsewhere, structures.within.size, ways)]
+            if elsewhere and not gained.is_rejected
+            else []
+        ),
         *limit_force(force),
         *limit_clipped(force),
         *limit_latency_left(force),

@@ -39,11 +39,11 @@ def best_additions(
     evidence: Evidence, members: Members, breadth: int = BREADTH, banned: Collection[str] = ()
 ) -> list[int]:
     """The candidates that lower the score of ``members`` most, at most ``breadth``, each effect at its best shape."""
-    taken = {evidence.linearisation.candidates[m].slot for m in members}
+    taken_slots = {evidence.linearisation.candidates[m].slot for m in members}
     best: dict[str, tuple[float, int]] = {}
     for score, k, strengths in evidence.extensions(members):
         one = evidence.linearisation.candidates[k]
-        if one.slot in taken or one.name in banned:
+        if one.slot in taken_slots or one.name in banned:
             continue
         if not has_physical_sign(evidence, k, strengths):
             continue
@@ -59,8 +59,11 @@ def best_step(evidence: Evidence, start: Members = (), banned: Collection[str] =
     if len(best.members) < MOST_MEMBERS:
         sets += [(*best.members, k) for k in best_additions(evidence, best.members, BREADTH, banned)]
     for member in best.members:
-        less = best.without(member)
-        sets += [less, *((*less, k) for k in best_additions(evidence, less, SWAPS, banned))]
+        without_member = best.without(member)
+        sets += [
+            without_member,
+            *((*without_member, k) for k in best_additions(evidence, without_member, SWAPS, banned)),
+        ]
     evidence.prepare_departures({member for members in sets for member in members})
     trials = (evidence.posterior(members) for members in sets)
     return min([best, *(one for one in trials if is_admissible(evidence, one))], key=lambda one: one.score)

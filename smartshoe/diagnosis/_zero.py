@@ -227,9 +227,8 @@ def zeros_of(
     is_clear[1] &= as_read[0] * as_read[1] > 0.0 and min(map(abs, as_read)) >= z_limit * as_read_sd
     beyond_load = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _may_have_drifted(beyond_load, sessions, model, thresholds):
-        return (
-            Zero(sensor, beyond_load, reading_sd, abs(beyond_load), (machine.name,), True),
-        )  # no further cause is needed
+        # A drift that began before explains the zero, and no further cause is needed.
+        return (Zero(sensor, beyond_load, reading_sd, abs(beyond_load), (machine.name,), True),)
     named = []
     if is_clear[0]:
         named.append(Zero(machine, -load, load_sd, abs(load * model.gain)))
