@@ -37,12 +37,12 @@ def cause_of(
     gained = gain(errors(fine, without), best, scale, thresholds)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
-        _without_it(name),
+        _fall_without_it(name),
         *_held_out_evidence(member.size, gained, thresholds.material),
-        *_against(rivals, name.equivalents),
+        *_nearest_rival(rivals, name.equivalents),
         *_how_sure(name, law, rivals, found, thresholds),
-        *_missed_by(law, name, thresholds),
-        *_not_shown(name, excitation),
+        *_missed_by_law(law, name, thresholds),
+        *_missing_excitation(name, excitation),
     )
     by = None if law is None else law.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
@@ -59,7 +59,7 @@ def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
     return tuple(one for one in sorted(near.values(), key=lambda one: one.margin) if one.effect in catalogue())
 
 
-def _without_it(name: Name) -> Statement:
+def _fall_without_it(name: Name) -> Statement:
     """How much less probable the data is without the effect."""
     nothing = next((a.margin for a in name.member.alternatives if a.effect is None), 0.0)
     return Statement(
@@ -71,7 +71,7 @@ def _without_it(name: Name) -> Statement:
     )
 
 
-def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[Statement]:
+def _nearest_rival(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[Statement]:
     """The nearest rival and its margin; nothing where there is none."""
     if not rivals:
         return []
@@ -114,7 +114,7 @@ def _how_sure(
     return []
 
 
-def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> list[Statement]:
+def _missed_by_law(law: Alternative | None, name: Name, thresholds: Thresholds) -> list[Statement]:
     """How much of a flexible block the law that names it misses."""
     if law is None:
         return []
@@ -128,7 +128,7 @@ def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> l
     return [Statement("share of its kind that the law misses in percent", missed, most, says)]
 
 
-def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
+def _missing_excitation(name: Name, excitation: Excitation) -> list[Statement]:
     """What would show such an effect best and is missing in this data."""
     lacking = excitation.lacking(name.effect)
     if not lacking:

@@ -63,7 +63,7 @@ class Compensation:
 
     @cached_property
     def zero(self) -> float:
-        """The recordings' mean offset beside that part, a share of full scale."""
+        """The recordings' mean offset with only that part simulated, a share of full scale."""
         return mean_offset(self.fine, self.undone)
 
 

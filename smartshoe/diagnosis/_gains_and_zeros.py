@@ -152,8 +152,8 @@ def _with_jumping_zeros(state: State, sessions: Sequence[Session], rivals: Seque
     if jumping is found or not are_supported(state, found.searched(), jumping := jumping.searched()):
         return None
     score = jumping.comparable_score(sessions)
-    quiet = (_OwnTerms.of(state, one.sessions, noise_sd).searched() for one in rivals)
-    if any(score >= one.comparable_score(sessions) for one in quiet):
+    scored = (_OwnTerms.of(state, one.sessions, noise_sd).searched() for one in rivals)
+    if any(score >= one.comparable_score(sessions) for one in scored):
         return None
     return jumping if any_jumps(jumping.sessions, jumping.model(state), state.thresholds) else None
 
@@ -274,7 +274,7 @@ def are_supported(state: State, found: _OwnTerms, with_own: _OwnTerms) -> bool:
 def predicts_better(
     model: ExtendedModel, plain: ExtendedModel, state: State, sessions: Sequence[Session], with_own: Sequence[Session]
 ) -> bool:
-    """Whether ``model``, found beside own terms, predicts ``sessions`` better than ``plain`` does without these terms.
+    """Whether ``model``, found with own terms, predicts ``sessions`` better than ``plain`` does without these terms.
 
     An own gain says nothing of another recording, so that the common gain and constant zeros are used. With changes
     within recordings these are left out in turn. Gains of whole recordings bend fits to fewer of them, so that there

@@ -173,11 +173,11 @@ class Gain:
 
     def certain_fall(self, scale: Scale) -> float:
         """Rms, a share of full scale, that is removed for certain; else 0."""
-        return _beyond(self.rmse_before, self.rmse_after, scale) if self.is_certain else 0.0
+        return _rms_excess(self.rmse_before, self.rmse_after, scale) if self.is_certain else 0.0
 
     def growth(self, scale: Scale) -> float:
         """Rms, a share of full scale, by which the error grows, certain or not; else 0."""
-        return _beyond(self.rmse_after, self.rmse_before, scale)
+        return _rms_excess(self.rmse_after, self.rmse_before, scale)
 
     @property
     def is_rejected(self) -> bool:
@@ -195,7 +195,7 @@ class Gain:
         }
 
 
-def _beyond(more: float, less: float, scale: Scale) -> float:
+def _rms_excess(more: float, less: float, scale: Scale) -> float:
     """Rms, a share of full scale, of the difference of the squares; 0 where ``more`` is not the larger."""
     square = more**2 - less**2
     return math.sqrt(square) / abs(scale.reading) if square > 0.0 else 0.0

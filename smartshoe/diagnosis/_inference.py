@@ -329,7 +329,7 @@ def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple
 
 
 def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) -> Member | None:
-    """The smallest immaterial effect that has another of its family beside it and is not in the plain model."""
+    """The smallest immaterial effect that shares its family with another one and is not in the plain model."""
     families = [one.effect.kind for one in members]
     twice = [
         one

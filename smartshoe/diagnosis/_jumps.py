@@ -31,7 +31,7 @@ def moments_of(session: Session, thresholds: Thresholds) -> Index:
 
 
 def rounded_to(session: Session, model: ExtendedModel, thresholds: Thresholds) -> float:
-    """The resolution of a recording's reading, a share of full scale, where it is coarse beside the noise; else 0."""
+    """The resolution of a recording's reading, a share of full scale, where it is coarse against noise; else 0."""
     sensor = session.recording.sensor
     values = reading_in(session.recording, find_unit(model.reading_unit) or sensor.unit)
     return coarse_step(values[sensor.present], thresholds) / abs(model.full_scale_reading)
@@ -68,60 +68,62 @@ def _has_jump(session: Session, model: ExtendedModel, places: int, thresholds: T
     The residual also changes between other moments, which gives its usual change and their number the degrees of
     freedom of Student's t (1908).
     """
-    shares, left = _changes_of(session, model)
+    shares, residual = _changes_of(session, model)
     free = moments_of(session, thresholds).size - shares.size
     if free < 1:
         return False
-    moved = _mean_steps(session, left, thresholds)
-    usual = math.sqrt(float(np.mean(moved**2)) * (free + shares.size) / free)
-    most = -float(stdtrit(free, 0.5 * thresholds.false_alarm / places)) * usual
+    mean_steps = _mean_steps(session, residual, thresholds)
+    usual_step = math.sqrt(float(np.mean(mean_steps**2)) * (free + shares.size) / free)
+    threshold = -float(stdtrit(free, 0.5 * thresholds.false_alarm / places)) * usual_step
     ends = (0, *session.zero_changes, session.reading.size)
     for k, (at, share) in enumerate(zip(session.zero_changes, shares, strict=True)):
-        seen = float(share + moved[at])
-        if abs(seen) > most and _is_alike(seen, share, thresholds):
-            again = _change_at_equal_loads(session, left, at, slice(ends[k], ends[k + 2]), thresholds)
+        observed = float(share + mean_steps[at])
+        if abs(observed) > threshold and _is_alike(observed, share, thresholds):
+            again = _change_at_equal_loads(session, residual, at, slice(ends[k], ends[k + 2]), thresholds)
             if again is not None and _is_alike(share + again, share, thresholds):
                 return True
     return False
 
 
 def _changes_of(session: Session, model: ExtendedModel) -> tuple[Array, Array]:
-    """The changes (l,) of a session's zero, shares of full scale, and the residual (n,) beside them."""
+    """The changes (l,) of a session's zero, shares of full scale, and the residual (n,) without them."""
     residual = session.reading - model.simulate(session.conditions)
     own, added = own_terms_of(session, model, residual)
     return session.zero_sd * gains_and_zero_changes(session, own)[1], residual - added
 
 
-def _is_alike(seen: float, share: float, thresholds: Thresholds) -> bool:
-    """Whether the observed part ``seen`` of a change agrees with its ``share`` within a factor `clear`."""
-    return share != 0.0 and 1.0 <= thresholds.clear * seen / share <= thresholds.clear**2
+def _is_alike(observed: float, share: float, thresholds: Thresholds) -> bool:
+    """Whether the observed part ``observed`` of a change agrees with its ``share`` within a factor `clear`."""
+    return share != 0.0 and 1.0 <= thresholds.clear * observed / share <= thresholds.clear**2
 
 
-def _mean_steps(session: Session, left: Array, thresholds: Thresholds) -> Array:
-    """(n,) change of the mean of ``left`` at each sample, over the length of a moment on either side.
+def _mean_steps(session: Session, residual: Array, thresholds: Thresholds) -> Array:
+    """(n,) change of the mean of ``residual`` at each sample, over the length of a moment on either side.
 
     0 where nothing is fitted on either side.
     """
-    width = left.size // (moments_of(session, thresholds).size + 1)
-    at = np.arange(left.size)
-    before, after = np.maximum(at - width, 0), np.minimum(at + width, left.size)
-    sums = np.concatenate([[0.0], np.cumsum(np.where(session.fitted, left, 0.0))])
+    width = residual.size // (moments_of(session, thresholds).size + 1)
+    at = np.arange(residual.size)
+    before, after = np.maximum(at - width, 0), np.minimum(at + width, residual.size)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(session.fitted, residual, 0.0))])
     counts = np.concatenate([[0], np.cumsum(session.fitted)])
     earlier, later = counts[at] - counts[before], counts[after] - counts[at]
     moved = (sums[after] - sums[at]) / np.maximum(later, 1) - (sums[at] - sums[before]) / np.maximum(earlier, 1)
     return np.where((earlier > 0) & (later > 0), moved, 0.0)
 
 
-def _change_at_equal_loads(session: Session, left: Array, at: int, part: slice, thresholds: Thresholds) -> float | None:
-    """By how much ``left`` differs after a sample from before, within ``part``, at equal load and direction of motion.
+def _change_at_equal_loads(
+    session: Session, residual: Array, at: int, part: slice, thresholds: Thresholds
+) -> float | None:
+    """The mean change of ``residual`` at a sample, within ``part``, between equal loads and directions of motion.
 
     A jump moves the reading equally at each load; a curve acts only at new loads, and a loop only as the load turns.
     None where hardly any load recurs.
     """
     fitted = session.fitted[part]
     load, rate = session.conditions.load[part][fitted], session.conditions.rate_per_s[part][fitted]
-    way = np.where(np.abs(rate) < thresholds.still_per_s, 0.0, np.sign(rate))
-    _, state = np.unique(3.0 * np.floor(load / thresholds.standing) + way, return_inverse=True)
+    direction = np.where(np.abs(rate) < thresholds.still_per_s, 0.0, np.sign(rate))
+    _, state = np.unique(3.0 * np.floor(load / thresholds.standing) + direction, return_inverse=True)
     is_after = (np.arange(part.start, part.stop) >= at)[fitted]
     later, earlier = (
         np.bincount(state[is_after], minlength=load.size),
@@ -130,6 +132,6 @@ def _change_at_equal_loads(session: Session, left: Array, at: int, part: slice, 
     weights = later * earlier / np.maximum(later + earlier, 1)  # inverse variance of a difference of two means
     if weights.sum() < thresholds.few:
         return None
-    sums = (np.bincount(state[one], left[part][fitted][one], load.size) for one in (is_after, ~is_after))
+    sums = (np.bincount(state[one], residual[part][fitted][one], load.size) for one in (is_after, ~is_after))
     after, before = (of / np.maximum(count, 1) for of, count in zip(sums, (later, earlier), strict=True))
     return float(weights @ (after - before) / weights.sum())

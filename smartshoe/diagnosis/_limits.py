@@ -144,7 +144,7 @@ def limit_remembered(name: Name) -> str:
 
 
 def reason_few_cycles(name: Name, cycles: int) -> str:
-    """Why an effect is no cause beside as many surer ones as there are load cycles."""
+    """Why an effect is no cause where there are as many surer ones as load cycles."""
     said = _unnamed(name, f"so few load cycles ({cycles}) show no more than as many causes")
     return f"{said} (repeat the cycles)"
 

@@ -55,10 +55,10 @@ def names_of(
       ``best_single``, if it cannot be ruled out. Each is half sure at most.
 
     ``is_clocked``: peak loads rise or fall with time, so that effects that go with time imitate each other and curves;
-    these are half sure at most. So is any memory effect beside a curve at the end of its range, since it may be what
-    that curve misses. ``is_unsteady``: zeros jump, and unseen jumps may imitate any effect, so that all are half sure
-    at most. Flexible blocks, and curves at the end of their kind, carry the name of the nearest law; no name is given
-    twice.
+    these are half sure at most. So is any memory effect together with a curve at the end of its range, since it may be
+    what that curve misses. ``is_unsteady``: zeros jump, and unseen jumps may imitate any effect, so that all are half
+    sure at most. Flexible blocks, and curves at the end of their kind, carry the name of the nearest law; no name is
+    given twice.
     """
     named = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
     named = [_with_confounded(name, thresholds) for name in named]

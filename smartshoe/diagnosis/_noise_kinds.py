@@ -1,4 +1,4 @@
-"""Kinds of noise in the residual of the chosen model, beside data faults and causes."""
+"""Kinds of noise in the residual of the chosen model, in addition to data faults and causes."""
 
 from __future__ import annotations
 

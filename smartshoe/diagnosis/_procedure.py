@@ -102,7 +102,7 @@ def diagnosed(
         adopted = _Adopted(found.baseline, plain, baseline, structures.before)
     verdict, rest = outcome.verdict, unexplained_of(causes, structures.before, adopted.left)
     of_held_out = held_out_rms(fine, structures.residuals_after, thresholds)
-    # Noise is at most what is not structure, and what fitted data has beside its own structure: what a model fails to
+    # Noise is at most what is not structure, and what fitted data holds besides its structure: what a model fails to
     # predict is not noise for that. What is white in held-out data is noise in any case.
     structure = of_held_out if outcome.unproven else min(max(structures.after.rms, outcome.elsewhere), of_held_out)
     no_more = min(best.rmse**2 - structure**2, extended.noise**2 - structures.within.rms**2)
@@ -350,7 +350,7 @@ def _strongest_single_effects(found: Inference) -> tuple[Rival, ...]:
 
 
 def _material_zeros(found: Inference, given: Prepared, left: float, residual_sd: float) -> list[Zero]:
-    """The material offsets and tares that are seen beside what was ``found``."""
+    """The material offsets and tares that are seen together with what was ``found``."""
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     lasting_memory = math.hypot(*(one.size for one in found.members if one.effect.never_fades))
     zeros = zeros_of(
@@ -376,7 +376,7 @@ def _with_offset(
     """``model`` with the recordings' mean offset, so that it gives readings as logged.
 
     Also where an offset is named, since the model may be off at the rest that shows it. With ``undone``, the part of
-    the model that is undone, the offset is the one beside that part.
+    the model that is undone, the offset is that with this part only.
     """
     tares = [(zero.effect, np.array([zero.value])) for zero in zeros if zero.effect.shifts == "load"]
     of = undone or model

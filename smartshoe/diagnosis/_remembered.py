@@ -34,16 +34,18 @@ def may_be_remembered(drift: Name, model: ExtendedModel, sessions: Sequence[Sess
     if not arms:
         return False
     fitted = fitted_of(sessions)
-    whole, without = (
+    cost, cost_without = (
         sum(float(np.sum(residual_of(one, each)[one.fitted] ** 2)) for one in fitted)
         for each in (model, drift.member.without.model)
     )
-    gram = np.sum([_gram_beside(arms, one, bare, without) for one in fitted], axis=0)
-    beside = float(gram[0, 0] - gram[0, 1:] @ np.linalg.pinv(gram[1:, 1:], rcond=1e-10, hermitian=True) @ gram[1:, 0])
-    return beside - whole <= thresholds.departure**2 * (without - whole)
+    gram = np.sum([_gram_without_own_terms(arms, one, bare, cost_without) for one in fitted], axis=0)
+    cost_with_arms = float(
+        gram[0, 0] - gram[0, 1:] @ np.linalg.pinv(gram[1:, 1:], rcond=1e-10, hermitian=True) @ gram[1:, 0]
+    )
+    return cost_with_arms - cost <= thresholds.departure**2 * (cost_without - cost)
 
 
-def _gram_beside(arms: Sequence[Arm], session: Session, model: ExtendedModel, squares: float) -> Array:
+def _gram_without_own_terms(arms: Sequence[Arm], session: Session, model: ExtendedModel, squares: float) -> Array:
     """(1 + p, 1 + p) inner products of the residual and slopes of ``model``, own terms and arm states projected out.
 
     Where the session begins loaded the state of each arm may be off by as much as its first load causes. ``squares`` is

@@ -196,7 +196,7 @@ def extrapolating_effect(sessions: Sequence[Session], model: ExtendedModel, thre
     """
     whole = [model.simulate(one.conditions) for one in sessions]
     for part in model.parts:
-        by = _moved(sessions, whole, model.without(part.name))
+        by = _contributions(sessions, whole, model.without(part.name))
         within = _centred_rms(by, [one.fitted for one in sessions])
         if thresholds.departure * within >= thresholds.imperfection:
             continue
@@ -215,8 +215,8 @@ def cancelling_effects(sessions: Sequence[Session], model: ExtendedModel, thresh
     """
     seen = [one.fitted for one in sessions]
     whole = [model.simulate(one.conditions) for one in sessions]
-    sizes = {name: _centred_rms(_moved(sessions, whole, model.without(name)), seen) for name in model.names}
-    together = _centred_rms(_moved(sessions, whole, replace(model, parts=())), seen)
+    sizes = {name: _centred_rms(_contributions(sessions, whole, model.without(name)), seen) for name in model.names}
+    together = _centred_rms(_contributions(sessions, whole, replace(model, parts=())), seen)
     if sum(size**2 for size in sizes.values()) <= thresholds.clear * together**2:
         return []
     return [name for name, size in sizes.items() if size > (1.0 - thresholds.same) * together]
@@ -232,7 +232,7 @@ def rms_difference(sessions: Sequence[Session], first: ExtendedModel, second: Ex
     return fitted_rms(sessions, [residual_of(session, first) - residual_of(session, second) for session in sessions])
 
 
-def _moved(sessions: Sequence[Session], whole: Sequence[Array], less: ExtendedModel) -> list[Array]:
+def _contributions(sessions: Sequence[Session], whole: Sequence[Array], less: ExtendedModel) -> list[Array]:
     """(n,) for each session: by how much its reading ``whole`` exceeds that of a model that lacks something."""
     return [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
 

@@ -66,9 +66,9 @@ def held_out_excess(
     ``within`` is the rms of the fitted ones. A recording that exceeds it by `clear`, and what is tolerable, is of
     another unit, or of loads that were not learnt.
     """
-    apart = [(one, residual) for one, residual in zip(sessions, residuals, strict=True) if one.held_out.all()]
-    off = beyond_noise(all_fitted([one for one, _ in apart]), [residual for _, residual in apart], thresholds)
-    seen = np.concatenate([residual[one.usable] for one, residual in apart]) if apart else np.zeros(1)
+    unfitted = [(one, residual) for one, residual in zip(sessions, residuals, strict=True) if one.held_out.all()]
+    off = beyond_noise(all_fitted([one for one, _ in unfitted]), [residual for _, residual in unfitted], thresholds)
+    seen = np.concatenate([residual[one.usable] for one, residual in unfitted]) if unfitted else np.zeros(1)
     white = float(seen @ seen) / max(seen.size, 1) - off**2
     chance = largest_of_noise(1, thresholds) * math.sqrt(2.0 / max(seen.size, 1)) * white
     is_off = off > thresholds.clear * max(within, thresholds.tolerable) and off**2 > chance

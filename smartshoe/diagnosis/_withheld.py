@@ -61,12 +61,12 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
     cycles = load_cycles(given.sessions, thresholds)
     surest = sorted(chosen.names, key=lambda one: -one.kind_probability)[:cycles]
     chosen = chosen.without(lambda one: None if one in surest else reason_few_cycles(one, cycles))
-    parted = limit_clocks_disagree(given.clocks, found.fit.model, given.sessions, thresholds)
-    clocks = [] if parted is None else [effect for effect, _ in given.clocks]
+    clocks_disagree = limit_clocks_disagree(given.clocks, found.fit.model, given.sessions, thresholds)
+    clocks = [] if clocks_disagree is None else [effect for effect, _ in given.clocks]
     names = tuple(one for one in chosen.names if one.effect not in clocks)
-    before = () if parted is None else (parted,)
-    past = tuple(limit_zero_drifted(one, given.scale) for one in zeros if one.may_have_drifted)
-    led = tuple(
+    before = () if clocks_disagree is None else (clocks_disagree,)
+    drifted = tuple(limit_zero_drifted(one, given.scale) for one in zeros if one.may_have_drifted)
+    extrapolated = tuple(
         limit_zero_extrapolated(one, given.scale, thresholds)
         for one in zeros
         if one.extrapolated_from and not one.may_have_drifted
@@ -79,7 +79,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
             one.may_have_drifted or one.extrapolated_from or (found.zero_changes and one.effect.shifts == "reading")
         )
     )
-    chosen = NamedCauses(names, kept, (*before, *chosen.limits), chosen.unnamed_rms, (*past, *led))
+    chosen = NamedCauses(names, kept, (*before, *chosen.limits), chosen.unnamed_rms, (*drifted, *extrapolated))
     chosen = chosen.without(
         lambda one: reason_tare_creeps(one, creeping_tare(kept, one.effect, one.member.size, thresholds))
     )
@@ -98,14 +98,14 @@ def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepa
 def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCauses:
     """The names of what was found, without effects of no named kind and effects that this data cannot show.
 
-    Whenever such an effect is removed all others are named again, so that none is named for being beside it.
+    Whenever such an effect is removed all others are named again, so that none owes its name to it.
     """
     thresholds = given.thresholds
     members = [one for one in found.members if one.name not in found.cancelling_names]
     limits: tuple[str, ...] = ()
     unnamed_rms = 0.0
     while True:
-        likely = names_of(
+        names = names_of(
             members,
             residual_rms,
             thresholds,
@@ -113,24 +113,24 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
             is_unsteady=bool(found.zero_changes),
             best_single=found.best_single,
         )
-        if not likely and found.best_single is not None:
-            # The best single effect does not depend on what cancels it beside others.
+        if not names and found.best_single is not None:
+            # The best single effect does not depend on effects that cancel it.
             cancelling_members = [
                 one
                 for one in found.members
                 if one.name in found.cancelling_names and one.effect.kind == found.best_single.kind
             ]
-            likely = names_of(
+            names = names_of(
                 cancelling_members, residual_rms, thresholds, is_unsteady=True, best_single=found.best_single
             )
-        shown = NamedCauses(likely, (), limits).without(
+        shown = NamedCauses(names, (), limits).without(
             lambda one: (
                 reason_of_another_kind(one, found.fit.model, thresholds)
                 or reason_not_shown(one, given.excitation)
                 or reason_no_gas(one, given.scale.unit)
             )
         )
-        withheld = [one.member for one in likely if one not in shown.names]
+        withheld = [one.member for one in names if one not in shown.names]
         limits, unnamed_rms = shown.limits, max([unnamed_rms, *(one.size for one in withheld)])
         if not any(one in members for one in withheld):
             return replace(shown, unnamed_rms=unnamed_rms)

@@ -69,7 +69,7 @@ class OwnZeros:
 def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> OwnZeros | None:
     """The zeros of all usable recordings, or None where they differ by no more than what the model leaves.
 
-    Recordings that continue another are left out, since the unit keeps what it lost or gained. None also beside an arm
+    Recordings that continue another are left out, since the unit keeps what it lost or gained. None also with an arm
     that no wall has, since a slow arm may replace a zero.
     """
     if has_extreme_arm(model):

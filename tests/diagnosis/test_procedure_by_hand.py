@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
-from smartshoe.diagnosis._causes import _against, _held_out_evidence, cause_of, zero_cause_of
+from smartshoe.diagnosis._causes import _held_out_evidence, _nearest_rival, cause_of, zero_cause_of
 from smartshoe.diagnosis._diagnose import _pulled_reason, _refused
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, own_terms_of
@@ -433,10 +433,10 @@ def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelie
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", margin),))
     (rival,) = (one for one in cause.evidence if one.statistic == "margin to the nearest rival")
     assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, {said}")
-    assert _against(()) == []
-    (far,) = _against([Rival("delay", 278533.0, "evidence")])
+    assert _nearest_rival(()) == []
+    (far,) = _nearest_rival([Rival("delay", 278533.0, "evidence")])
     assert far.says == "delay, the nearest other, is less likely by 278,533 (-2 log likelihood)"
-    (likelier,) = _against([Rival("delay", -12.0, "evidence")])
+    (likelier,) = _nearest_rival([Rival("delay", -12.0, "evidence")])
     assert likelier.says == "delay, the nearest other, is likelier by 12 (-2 log likelihood)"
 
 
