@@ -272,7 +272,7 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     usual = 0.9 * limits.departure * large
     assert usual > limits.tolerable
     assert verdict_of(causes[:1], _left(large), _left(usual), limits) == "explained"
-    assert verdict_of(causes[:1], _left(large), _left(usual), limits, follows=False) == "partly_explained"
+    assert verdict_of(causes[:1], _left(large), _left(usual), limits, is_lawful=False) == "partly_explained"
     between = 0.5 * (limits.material + limits.tolerable)
     assert said([], between) == (
         "adequate",
