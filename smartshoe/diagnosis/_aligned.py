@@ -1,7 +1,7 @@
-"""Recordings on one clock, before any model sees them.
+"""Recordings put on one clock, before any model sees them.
 
-What two clocks make of a recording must not be left to a model: a lag or a relaxation would be named in its place.
-A lag or a drift that all recordings share is a cause like any other, and the model bears it from the start.
+Two clocks must not be left to a model: a lag or a relaxation would be named in their place. A lag or drift that all
+recordings share is a cause like any other, and is part of the model from the start.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._scale import moves_with
+from smartshoe.diagnosis._scale import load_reading_covariance
 from smartshoe.integrity import Integrity, OneClock
 from smartshoe.models.effects import Effect, between_clocks
 from smartshoe.recording import Recording
@@ -20,10 +20,10 @@ from smartshoe.recording import Recording
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """Recordings, usable samples, effects of timing with values that the model starts with, sentences.
+    """Recordings on one clock, their usable samples, the timing effects ``parts`` of the model, and sentences.
 
-    ``places`` of the recordings among those that were given: what has no usable sample is left out. ``moved`` are the
-    places of those whose reading was moved by a lag of their own.
+    ``places`` are those of the recordings among all given, without those that have no usable sample; ``moved`` those
+    whose reading was shifted by a lag of their own.
     """
 
     recordings: list[Recording]
@@ -35,24 +35,26 @@ class Aligned:
 
 
 def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
-    """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own.
+    """The recordings, each on one clock: by a shared delay or drift in the model, or each shifted by its own lag.
 
-    One that only judges, and goes by another clock than the fitted ones share, is moved to that one.
+    A recording that only judges, on another clock than the fitted ones share, is shifted to that one.
     """
     places = [k for k, mask in enumerate(integrity.usable) if mask.any()]
     lags, rates = integrity.clock_offset_s, integrity.clock_rate
     delay, drift = between_clocks("lag"), between_clocks("rate")
     shared = integrity.one_clock
     is_told = any(lags[k] or rates[k] for k in places if k not in integrity.others)
-    borne = shared if is_told and shared is not None and abs(shared.before_s) < delay.parameters[0].upper else None
-    theirs = borne if is_told else shared
+    clock_in_model = (
+        shared if is_told and shared is not None and abs(shared.before_s) < delay.parameters[0].upper else None
+    )
+    clock_of_fitted = clock_in_model if is_told else shared
     made, usable, says, moved = [], [], [], []
     for place in places:
         recording, mask, offset_s, rate = recordings[place], integrity.usable[place], lags[place], rates[place]
-        if place in integrity.others and theirs is not None:
+        if place in integrity.others and clock_of_fitted is not None:
             middle_s = np.array(0.5 * recording.duration_s)
-            offset_s, rate = offset_s - float(theirs.lag_s(middle_s)), rate - theirs.rate
-        elif borne is not None:
+            offset_s, rate = offset_s - float(clock_of_fitted.lag_s(middle_s)), rate - clock_of_fitted.rate
+        elif clock_in_model is not None:
             offset_s = rate = 0.0
         if offset_s or rate:
             moved.append(place)
@@ -67,18 +69,21 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
                 " unit that is late, the force of a calibration is as late"
             )
         made.append(recording)
-        usable.append(mask if borne is None else mask & _is_load_known(recording, borne))
-    if borne is None:
+        usable.append(mask if clock_in_model is None else mask & _is_load_known(recording, clock_in_model))
+    if clock_in_model is None:
         return Aligned(made, usable, (), tuple(says), places, frozenset(moved))
-    late, parting = (delay, np.array([borne.before_s])), (drift, np.array([borne.rate]))
-    return Aligned(made, usable, (parting, late) if borne.rate else (late,), tuple(says), places, frozenset(moved))
+    late, parting = (delay, np.array([clock_in_model.before_s])), (drift, np.array([clock_in_model.rate]))
+    return Aligned(
+        made, usable, (parting, late) if clock_in_model.rate else (late,), tuple(says), places, frozenset(moved)
+    )
 
 
-def as_they_follow(recordings: Sequence[Recording], usable: Sequence[Mask], shared: OneClock | None) -> list[Recording]:
-    """``recordings`` with each reading at the moment whose load it follows, by the lag that all of them ``shared``.
+def with_lags_removed(
+    recordings: Sequence[Recording], usable: Sequence[Mask], shared: OneClock | None
+) -> list[Recording]:
+    """``recordings`` with each reading shifted to the load that it follows, by the ``shared`` lag.
 
-    Unless they follow their loads more as they are: what relaxes in long holds falls behind them as though it were late
-    and turned over.
+    Unshifted where that covaries more with the load: relaxation in long holds looks like a lag and a reversed sign.
     """
     as_read = [*recordings]
     if shared is None:
@@ -88,18 +93,18 @@ def as_they_follow(recordings: Sequence[Recording], usable: Sequence[Mask], shar
         _on_one_clock(one, one.sensor.present, offset_s, shared.rate)[0]
         for one, offset_s in zip(recordings, offsets_s, strict=True)
     ]
-    return max(as_read, moved, key=lambda some: abs(moves_with(some, usable)))
+    return max(as_read, moved, key=lambda some: abs(load_reading_covariance(some, usable)))
 
 
 def _is_load_known(recording: Recording, clock: OneClock) -> Mask:
-    """(n,) samples whose reading, late or early by a ``clock``, follows a load within the recording."""
+    """(n,) True where the reading, late or early by ``clock``, follows a load within the recording."""
     time_s = recording.time_s - recording.time_s[0]
     followed_s = time_s - clock.lag_s(time_s)
     return np.asarray((followed_s >= 0.0) & (followed_s <= time_s[-1]))
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:
-    """The recording with its reading moved, missing where it would be made by a missing one; what of it is usable."""
+    """The recording with its reading shifted, missing where a missing sample is involved, and its usable samples."""
     time_s = recording.time_s
     middle = 0.5 * (time_s[0] + time_s[-1])
     source_s = time_s + offset_s + rate * (time_s - middle)

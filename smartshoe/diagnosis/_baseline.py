@@ -1,4 +1,4 @@
-"""The baseline: the paper's standard linear solid, with an offset and an initial state of each recording's own."""
+"""The baseline: the paper's standard linear solid, with an offset and an initial state for each recording."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
 from smartshoe.signals.lags import lagged
 
-USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
+USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # about the mean of the paper's four units (Table 1)
 _, SHARE, RATE = BASELINE
-MOST_OF_WALL = 5.0  # share: a wall whose static gain is six times its instant one would be a dashpot
-# A resolution: a fit starts at the best. All halved or doubled, no name changed in two cases.
+MOST_OF_WALL = 5.0  # share; beyond it the static gain is six times the instant one, and the wall a dashpot
+# A resolution of the start. All halved or doubled, no name changed in two cases.
 POLES_PER_S = np.geomspace(RATE.lower, RATE.upper, 35)
-WALL_RATIOS = 1.02, 50.0  # bounds of any tube's
+WALL_RATIOS = 1.02, 50.0  # bounds for any tube
 
 
 def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
-    """The best standard linear solid of a positive gain; its wall's ratio is that of `_wall_ratio`."""
+    """The best standard linear solid of positive gain, with the wall's ratio of `_wall_ratio`."""
     _, gain, share, pole = _best_by_sign(sessions).get(1.0, (0.0, 1.0, 0.0, 0.2))
     ratio = _wall_ratio(sessions, gain, scale)
     return ExtendedModel(gain, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), ratio)
 
 
-def is_turned_over(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
-    """Whether a solid of a negative gain follows ``sessions`` clearly better than any of a positive one.
+def has_negative_gain(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
+    """Whether a solid of negative gain follows ``sessions`` clearly better than any of positive gain.
 
-    What goes together at once does not tell the sign of a unit that is slower than its load: it rises still where the
-    load has fallen. Its static gain does.
+    Correlation does not tell the sign of a unit that is slower than its load, since it still rises when the load has
+    fallen. Its static gain does.
     """
     errors = {sign: best[0] for sign, best in _best_by_sign(sessions).items()}
     return thresholds.clear * errors.get(-1.0, math.inf) < errors.get(1.0, math.inf)
 
 
 def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float, float, float]]:
-    """Error, gain, share and pole in 1/s of the best solid of either sign of the gain, of those there are.
+    """Squared error, gain, share and pole (1/s) of the best solid for each sign of the gain.
 
-    Over a grid of poles, linear in the rest, so that no local optimum is taken. Either sign of what relaxes is allowed:
-    a baseline that may not follow the data leaves structure that no effect made.
+    A grid over poles, linear in the rest, so that there is no local optimum. The relaxing share may have either sign: a
+    baseline that cannot follow the data leaves structure that no effect made.
     """
     fitted = fitted_of(sessions)
     best: dict[float, tuple[float, float, float, float]] = {}
@@ -59,7 +59,7 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
         fast, slow = np.linalg.solve(part, gram[1:, 0])
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
         share = float(slow / fast) if fast != 0.0 else SHARE.upper
-        # A fit is within the bounds of both: beyond them it would begin at another solid than the one weighed here.
+        # Within the bounds of both, since a fit starts there: beyond them it would be another solid than this one.
         lowest, highest = max(SHARE.lower, RATE.lower / pole - 1.0), min(SHARE.upper, RATE.upper / pole - 1.0)
         shares = (share,) if lowest <= share <= highest else (lowest, highest)
         for share in shares:
@@ -73,24 +73,24 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
 
 
 def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
-    """``model`` with an arm as units have, from which a fit begins where its own is bent."""
+    """``model`` with a usual arm, to start a fit from where its own arm is bent by an effect."""
     return replace(model, relaxing_share=USUAL.relaxing_share, relaxation_rate_per_s=USUAL.relaxation_rate_per_s)
 
 
-def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
-    """Whether the baseline's arm is faster or slower than all that laws remember by: it follows an effect, no wall."""
+def has_arm_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
+    """Whether the baseline's arm is beyond all usual time constants: then it follows an effect, not the wall."""
     fastest_s, *_, slowest_s = thresholds.memory_s
     return not fastest_s < 1.0 / model.relaxation_rate_per_s < slowest_s
 
 
-def is_stretched(model: ExtendedModel) -> bool:
-    """Whether the baseline's arm is one as no wall has: it follows what an effect, or another sensor, does."""
+def has_extreme_arm(model: ExtendedModel) -> bool:
+    """Whether no wall has such an arm: it follows an effect, or another kind of sensor."""
     share, rate = model.relaxing_share, model.relaxation_rate_per_s
     return not (SHARE.lower < share < MOST_OF_WALL and RATE.lower < rate < RATE.upper)
 
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:
-    """1 + k1 x0^2/(nRT) where an effective area is declared, from the static gain; else what units usually have."""
+    """1 + k1 x0^2/(nRT) from the static gain where an effective area is declared; else the usual ratio."""
     recording = next((one.recording for one in sessions if "effective_area_m2" in one.recording.metadata), None)
     if recording is None or scale.unit.quantity != "pressure":
         return USUAL_WALL_RATIO

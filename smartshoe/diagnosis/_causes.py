@@ -1,4 +1,4 @@
-"""From a name to a cause: parameters in units, what its removal costs on held-out data, evidence in sentences."""
+"""From a name to a cause: parameters in units, the held-out error without it, and the evidence in sentences."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ def cause_of(
     excitation: Excitation,
     thresholds: Thresholds,
 ) -> Cause:
-    """The cause of a ``name`` in what was ``found``; ``best``: held-out errors of the extended model, in ``fine``."""
+    """The cause for a ``name``; ``best``: held-out errors of the extended model in ``fine``, the full-rate data."""
     member = name.member
-    law = name.by or next((a for a in member.laws if a.effect == name.effect.name), None)
+    law = name.law_in_place or next((a for a in member.laws if a.effect == name.effect.name), None)
     without = member.without.model.held_as(found.fit.model)
-    won = gain(errors(fine, without), best, scale, thresholds)
+    gained = gain(errors(fine, without), best, scale, thresholds)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
-        _without_it(name),
-        *_held_out_evidence(member.size, won, thresholds.material),
-        *_against(rivals, name.equivalents),
+        _fall_without_it(name),
+        *_held_out_evidence(member.size, gained, thresholds.material),
+        *_nearest_rival(rivals, name.equivalents),
         *_how_sure(name, law, rivals, found, thresholds),
-        *_missed_by(law, name, thresholds),
-        *_not_shown(name, excitation),
+        *_missed_by_law(law, name, thresholds),
+        *_missing_excitation(name, excitation),
     )
     by = None if law is None else law.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
     sure = confidence_of(name, thresholds), name.law_probability
-    return Cause(name.effect, *sure, name.equivalents, values, evidence, won, member.size, rivals, member.name)
+    return Cause(name.effect, *sure, name.equivalents, values, evidence, gained, member.size, rivals, member.name)
 
 
 def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
-    """The nearest first. Laws are weighed against the one named, whose ``own`` margin is that to its block."""
+    """The rivals, nearest first; margins of laws are counted from ``own``, the margin of the named law to its block."""
     member = name.member
     near = {a.effect: Rival(a.effect, a.margin, "evidence") for a in member.alternatives if a.effect is not None}
     near |= {a.effect: Rival(a.effect, a.margin - own, "fit") for a in member.laws if a.effect is not None}
@@ -59,7 +59,8 @@ def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
     return tuple(one for one in sorted(near.values(), key=lambda one: one.margin) if one.effect in catalogue())
 
 
-def _without_it(name: Name) -> Statement:
+def _fall_without_it(name: Name) -> Statement:
+    """How much less probable the data is without the effect."""
     nothing = next((a.margin for a in name.member.alternatives if a.effect is None), 0.0)
     return Statement(
         "fall of -2 log evidence",
@@ -70,7 +71,8 @@ def _without_it(name: Name) -> Statement:
     )
 
 
-def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[Statement]:
+def _nearest_rival(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[Statement]:
+    """The nearest rival and its margin; nothing where there is none."""
     if not rivals:
         return []
     nearest = rivals[0]
@@ -84,9 +86,9 @@ def _against(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[S
 def _how_sure(
     name: Name, law: Alternative | None, rivals: Sequence[Rival], found: Inference, thresholds: Thresholds
 ) -> list[Statement]:
-    """Why it is named though it is not sure, or though no law of its kind follows it."""
+    """Why it is named although it is not sure, or although no law of its kind follows."""
     if not name.is_sure:
-        does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
+        does_most_alone = found.best_single is not None and found.best_single.kind == name.effect.kind
         why = (
             "by itself it predicts best what is left out"
             if does_most_alone
@@ -112,11 +114,11 @@ def _how_sure(
     return []
 
 
-def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> list[Statement]:
-    """How much a law misses of the block that it names."""
+def _missed_by_law(law: Alternative | None, name: Name, thresholds: Thresholds) -> list[Statement]:
+    """How much of a flexible block the law that names it misses."""
     if law is None:
         return []
-    missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # of -2 log likelihood
+    missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # a share of the fall of -2 log likelihood
     most = 100 * thresholds.departure**2
     much = "no more" if missed <= most else "more"
     says = (
@@ -126,8 +128,8 @@ def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> l
     return [Statement("share of its kind that the law misses in percent", missed, most, says)]
 
 
-def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
-    """What the data lacks of that which shows such an effect best."""
+def _missing_excitation(name: Name, excitation: Excitation) -> list[Statement]:
+    """What would show such an effect best and is missing in this data."""
     lacking = excitation.lacking(name.effect)
     if not lacking:
         return []
@@ -136,32 +138,34 @@ def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
     return [Statement("what would show it best is missing", float(len(lacking)), 0.0, says)]
 
 
-def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:
+def _held_out_evidence(size: float, gained: Gain, material: float) -> list[Statement]:
+    """The effect's size and its gain on held-out data; ``size`` and ``material`` are shares of full scale."""
     moves = Statement(
         "size in percent of full scale",
         100 * size,
         100 * material,
         f"it moves the reading by {100 * size:.3g} % of full scale",
     )
-    if math.isnan(won.gain_percent):
+    if math.isnan(gained.gain_percent):
         return [moves]
-    way = "falls" if won.rmse_after <= won.rmse_before else "rises"
+    way = "falls" if gained.rmse_after <= gained.rmse_before else "rises"
     return [
         moves,
         Statement(
             "gain on held-out data in percent",
-            won.gain_percent,
+            gained.gain_percent,
             0.0,
-            f"on data not fitted the error {way} from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+            f"on data not fitted the error {way} from {gained.rmse_before:.4g} to {gained.rmse_after:.4g}"
+            f" {gained.unit}",
         ),
     ]
 
 
 def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds, is_of_all: bool = True) -> Cause:
-    """An offset or tare: removed, every reading is off by it, if it ``is_of_all`` recordings."""
+    """The cause for an offset or tare: without it every reading is off, if it ``is_of_all`` recordings."""
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
     nothing = Errors(best.squares[:0], best.counts[:0], math.nan)
-    won = gain(worse if is_of_all else nothing, best, scale, thresholds)
+    gained = gain(worse if is_of_all else nothing, best, scale, thresholds)
     parameter = zero.effect.parameters[0]
     factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
     interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
@@ -174,8 +178,8 @@ def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds
         f"it is {deviations:.3g} standard deviations from nothing",
     )
     sure = (
-        1.0 - thresholds.false_name if zero.is_seen else thresholds.least_confidence,  # or by its model alone
+        1.0 - thresholds.false_name if zero.is_seen else thresholds.least_confidence,  # or seen by the model only
         1.0 / (1.0 + len(zero.alternatives)),
     )
-    evidence = (seen, *_held_out_evidence(zero.size, won, thresholds.material))
-    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
+    evidence = (seen, *_held_out_evidence(zero.size, gained, thresholds.material))
+    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, gained, zero.size)

@@ -1,4 +1,4 @@
-"""The static characteristic, reading over load, without any model: what is known where no model of a unit holds."""
+"""The static characteristic, reading over load, without a model: what can be said where no model of a unit holds."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from smartshoe.signals.lags import lagged
 
 @dataclass(frozen=True, eq=False)
 class Branches:
-    """Medians of the reading over bins of the load, while it rises (``ups``) and while it falls (``downs``), (n,) each.
+    """Medians of the reading over bins of the load (n,), while it rises (``ups``) and while it falls (``downs``).
 
-    ``by_curve`` and ``by_branch``: share of the reading's variance that their mean explains, and the branches apart,
-    of what moves.
+    ``by_curve`` and ``by_branch`` are the shares of the reading's variance that their mean, and the two branches,
+    explain.
     """
 
     recording: Recording
@@ -35,14 +35,14 @@ class Branches:
         return 0.5 * (self.ups + self.downs)
 
     @property
-    def apart(self) -> float:
-        """By how much the reading lies higher while the load rises, the median over the load."""
+    def separation(self) -> float:
+        """By how much the reading is higher while the load rises, the median over the load."""
         return float(np.median(self.ups - self.downs))
 
 
 @dataclass(frozen=True, eq=False)
 class _Strokes:
-    """``load`` and ``reading`` (n,) where both are there; ``rate`` (n,), of the load, to a scale of its own."""
+    """``load`` and ``reading`` (n,) where both are present, and the ``rate`` (n,) of the load in arbitrary units."""
 
     load: Array
     reading: Array
@@ -50,13 +50,14 @@ class _Strokes:
     still: float
 
     def explained_by(self, place: Array, ups: Array, downs: Array) -> float:
-        """Share of the variance of what moves that two branches over ``place`` explain, each (bins,)."""
+        """Share of the variance of moving samples that two branches over ``place``, (bins,) each, explain."""
         moves = np.abs(self.rate) > self.still
         along = [np.interp(self.load[moves], place, branch) for branch in (ups, downs)]
         return _explained(self.reading[moves], np.where(self.rate[moves] > 0.0, *along))
 
 
 def _strokes_of(recording: Recording, thresholds: Thresholds) -> _Strokes | None:
+    """The samples of a recording with one load and one sensor; None where there are too few, or nothing moves."""
     if not recording.of_role("load") or len(recording.sensors) != 1:
         return None
     load, sensor = recording.load, recording.sensor
@@ -67,19 +68,19 @@ def _strokes_of(recording: Recording, thresholds: Thresholds) -> _Strokes | None
     width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
     if x.size < width:
         return None
-    rate = np.gradient(np.convolve(x, np.ones(width), "same"))  # to one scale: it is held against its own largest
+    rate = np.gradient(np.convolve(x, np.ones(width), "same"))  # its scale does not matter
     still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
     return _Strokes(x, y, rate, still)
 
 
 def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None:
-    """The two branches; None where the load seldom passes the same place in both directions."""
+    """The two branches; None where the load seldom passes a place in both directions."""
     strokes = _strokes_of(recording, thresholds)
     if strokes is None:
         return None
     x, y, rate = strokes.load, strokes.reading, strokes.rate
     low, high = (float(value) for value in np.percentile(x, [1, 99]))
-    # Rice's rule, of each direction's half.
+    # Rice's rule, for each direction's half.
     bins = 2 * round((0.5 * x.size) ** (1.0 / 3.0))
     edges = np.linspace(low, high, bins + 1)
     rises, falls = (_by_bin(x[moves], y[moves], edges) for moves in (rate > strokes.still, rate < -strokes.still))
@@ -97,22 +98,22 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
 
 
 def _by_bin(x: Array, y: Array, edges: Array) -> list[Array]:
-    """The ``y`` (n,) of the ``x`` (n,) from each of the ``edges`` (m + 1,) up to the next, in order."""
+    """The values ``y`` whose ``x`` lie in each bin between ``edges`` (m + 1,), in order."""
     number = np.digitize(x, edges)
     order = np.argsort(number, kind="stable")
     return np.split(y[order], np.searchsorted(number[order], np.arange(1, edges.size + 1)))[1:-1]
 
 
 def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:
-    """A sentence where the reading follows the load's direction and not the load; None where it does not."""
+    """A sentence where the reading follows the direction of the load and not the load; else None."""
     found = branches_of(recording, thresholds)
     if found is None or found.by_curve >= thresholds.follows or found.by_branch < thresholds.follows:
         return None
     return _friction(found, thresholds)
 
 
-def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
-    """Whether the branches of either half explain the other half: those of what wanders are chance."""
+def _is_reproducible(recording: Recording, thresholds: Thresholds) -> bool:
+    """Whether the branches of each half explain the other half, which chance branches would not."""
     middle_s = 0.5 * float(recording.time_s[0] + recording.time_s[-1])
     ends_s = (float(recording.time_s[0]), middle_s, float(recording.time_s[-1]))
     halves = [recording.between(*span) for span in pairwise(ends_s)]
@@ -126,9 +127,9 @@ def _comes_back(recording: Recording, thresholds: Thresholds) -> bool:
 
 
 def _fades(found: Branches, thresholds: Thresholds) -> bool:
-    """Whether the reading fades while the load stands, as charge does; friction stays there, or is gone at once.
+    """Whether the reading fades while the load is still, as charge does; friction stays, or is gone at once.
 
-    Then a line of the load and of what fades from it leaves clearly less there than the branches do.
+    Then a linear model of the load and its lag leaves clearly less there than the branches.
     """
     strokes = _strokes_of(found.recording, thresholds)
     if strokes is None:
@@ -152,16 +153,17 @@ def _fades(found: Branches, thresholds: Thresholds) -> bool:
 
 
 def _line_of(columns: Array, strokes: _Strokes) -> Array:
-    """(n,) the reading, as columns (n, k) and a constant follow it best."""
+    """(n,) the best linear combination of columns (n, k) and a constant for the reading."""
     with_constant = np.column_stack([np.ones(len(columns)), columns])
     return np.asarray(with_constant @ np.linalg.lstsq(with_constant, strokes.reading, rcond=None)[0])
 
 
 def _friction(found: Branches, thresholds: Thresholds) -> str | None:
-    if not _comes_back(found.recording, thresholds) or _fades(found, thresholds):
+    """The sentence on friction, where the branches are reproducible and do not fade; else None."""
+    if not _is_reproducible(found.recording, thresholds) or _fades(found, thresholds):
         return None
     sensor = found.recording.sensor
-    half = 0.5 * found.apart
+    half = 0.5 * found.separation
     return (
         f"the {sensor.name} of {found.recording.name} does not follow this load but its direction: while the load rises"
         f" it lies {abs(half):.3g} {sensor.unit.symbol} {'above' if half > 0 else 'below'} its mean, while it falls as"
@@ -171,7 +173,7 @@ def _friction(found: Branches, thresholds: Thresholds) -> str | None:
 
 
 def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | None:
-    """A sentence on curve and loop of the reading over its load; None where the two hardly go together."""
+    """A sentence on the curve and loop of the reading over its load; None where they hardly go together."""
     found = branches_of(recording, thresholds)
     if found is None or max(found.by_curve, found.by_branch) < thresholds.follows:
         return None
@@ -183,7 +185,7 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     unit, of_load = sensor.unit.symbol, recording.load.unit.symbol
     course = f"over this load the {sensor.name}"
     inner, lower, upper = np.abs(u) < 0.25, u < -0.5, u > 0.5
-    if min(inner.sum(), lower.sum(), upper.sum()) < 3:  # of two medians it is a difference, and no line
+    if min(inner.sum(), lower.sum(), upper.sum()) < 3:  # a line needs three medians
         whole = _slope(place, found.mean, np.full(place.size, True))
         way = "falls" if whole < 0.0 else "rises"
         shape = (
@@ -205,15 +207,15 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
 
 
 def has_two_signs(values: Array, thresholds: Thresholds) -> bool:
-    """Whether values lie on both sides of none, and about as far."""
+    """Whether values lie on both sides of zero, about equally far."""
     low, high = float(values.min()), float(values.max())
     return low < 0.0 < high and min(-low, high) > thresholds.same * max(-low, high)
 
 
 def _shape(middle: float, ends: float, is_odd: bool, thresholds: Thresholds) -> str:
-    """What is said of a curve by its slope about the middle and at the ends.
+    """The shape of a curve in words, from its slope in the middle and at the ends.
 
-    Friction only where load and reading turn round together (``is_odd``): any contact flattens, its axes exchanged.
+    Friction is named only where load and reading change sign together (``is_odd``), since any contact flattens.
     """
     if middle * ends < 0.0:
         return "it turns back, and no straight line describes it"
@@ -227,7 +229,7 @@ def _shape(middle: float, ends: float, is_odd: bool, thresholds: Thresholds) -> 
 
 
 def conductance_of(recordings: Sequence[Recording], thresholds: Thresholds) -> str | None:
-    """A sentence where the readings are resistances, and the conductance follows the load by a line far better.
+    """A sentence where the readings are resistances whose conductance is far more linear in the load; else None.
 
     Contacts that grow with the load conduct in proportion to it (Holm 1967).
     """
@@ -251,13 +253,16 @@ def conductance_of(recordings: Sequence[Recording], thresholds: Thresholds) -> s
 
 
 def _by_line(x: Array, y: Array) -> float:
+    """Share of the variance of ``y`` that a line of ``x`` explains."""
     return float(np.corrcoef(x, y)[0, 1]) ** 2
 
 
 def _explained(values: Array, by: Array) -> float:
+    """Share of the variance of ``values`` that a prediction ``by`` explains."""
     whole = float(np.var(values))
     return 1.0 - float(np.var(values - by)) / whole if whole > 0 else 0.0
 
 
 def _slope(place: Array, level: Array, among: Mask) -> float:
+    """Slope of ``level`` over ``place``, by least squares ``among`` the bins."""
     return float(np.polyfit(place[among], level[among], 1)[0])

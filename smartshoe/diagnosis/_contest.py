@@ -1,4 +1,4 @@
-"""What an experiment is foretold to tell of a cause and its rival: both fitted to what it would read."""
+"""A cause against its rival: how well this data, and this data with a simulated experiment, separates them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._experiments import EXPERIMENTS, sessions_on
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, weighed, within_bounds
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit, rows_of, within_bounds
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -18,11 +18,7 @@ from smartshoe.protocol import Protocol
 
 @dataclass(frozen=True, eq=False)
 class Contest:
-    """The ``cause`` as it is fitted, a ``rival`` in its place, and the model ``without`` either, all to the same data.
-
-    ``margin``: of -2 log likelihood, by which the rival follows worse. ``log_odds`` of the cause against the rival, as
-    a diagnosis weighs laws: no law is exact, and one that lacks less than laws usually depart by is as good.
-    """
+    """Three fits to the same data: with the ``cause``, with a ``rival`` in its place, and ``without`` either."""
 
     cause: Fit
     rival: Fit
@@ -30,63 +26,74 @@ class Contest:
 
     @property
     def margin(self) -> float:
+        """By how much -2 log likelihood is higher with the rival than with the cause."""
         return self.rival.cost - self.cause.cost
 
     @property
     def log_odds(self) -> float:
+        """Log odds of the cause against the rival, by `odds_of_law`: no law is taken as exact."""
         return self._log_odds_of(self.margin)
 
     def _log_odds_of(self, margin: float) -> float:
+        """The log odds at a given ``margin``."""
         fall = self.without.cost - self.cause.cost
         return -math.log(max(float(odds_of_law(margin, fall, self.cause.likelihood.thresholds)), 1e-300))
 
-    def settled(self) -> Contest:
-        """The same, the rival fitted on, as `after` does: so far only as a comparison of many asks for."""
+    def refitted(self) -> Contest:
+        """The same with the rival fitted further: it came from a comparison of many, which uses few steps."""
         return replace(self, rival=fit(self.cause.likelihood, self.rival.model, FEW_STEPS))
 
-    def after(
-        self, protocol: Protocol, sample_time_s: float, least: float = -math.inf, of_use: float = -math.inf
+    def after_experiment(
+        self,
+        protocol: Protocol,
+        sample_time_s: float,
+        min_margin_gain: float = -math.inf,
+        min_log_odds: float = -math.inf,
     ) -> Contest | None:
-        """The same were the protocol run once, logged every ``sample_time_s``, and the cause as it was fitted true.
+        """The contest once the protocol is run, logged every ``sample_time_s``, on a unit with the cause as fitted.
 
-        The rival is fitted on to this data and that, the new recording's own offset and past free; what is without
-        either begins from the cause, as in a diagnosis. None where the margin grows by no more than ``least``, or the
-        log odds come to no more than ``of_use``: however the rival is fitted on, it misses no more of that recording
-        than it does as it is, and what is without either falls behind by no less than now.
+        The rival is refitted to both, the new recording's own offset and memory free; the model without either starts
+        from the cause, as in a diagnosis. None where the margin grows by at most ``min_margin_gain``, or the log odds
+        reach at most ``min_log_odds``. Both are bounded before any fit, since refitting only reduces what the rival
+        misses.
         """
         known, model = self.cause.likelihood, self.cause.model
-        session = _foretold(model, protocol, sample_time_s, known.thresholds)
-        missed = Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model)
-        if missed <= least or self._log_odds_of(self.margin + missed) <= of_use:
+        session = _predicted_session(model, protocol, sample_time_s, known.thresholds)
+        predicted_miss = Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model)
+        if predicted_miss <= min_margin_gain or self._log_odds_of(self.margin + predicted_miss) <= min_log_odds:
             return None
         both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
-        cause = weighed(both, model)
+        cause = evaluated(both, model)
 
         def fitted(start: ExtendedModel, rows: list[Array]) -> Fit:
-            return fit(both, start, FEW_STEPS, [*rows, rows_of(start, session)], beside=cause.cost)
+            return fit(both, start, FEW_STEPS, [*rows, rows_of(start, session)], best_cost=cause.cost)
 
-        rival = fitted(*self._of_rival)
-        if rival.cost - cause.cost - self.margin <= least:
+        rival = fitted(*self._rival_start)
+        if rival.cost - cause.cost - self.margin <= min_margin_gain:
             return None
-        return Contest(cause, rival, fitted(*self._of_less))
+        return Contest(cause, rival, fitted(*self._without_start))
 
     @cached_property
-    def _of_rival(self) -> tuple[ExtendedModel, list[Array]]:
-        return self._begun(self.rival.model)
+    def _rival_start(self) -> tuple[ExtendedModel, list[Array]]:
+        """The rival's model and its rows of this data, from which each refit starts."""
+        return self._warm_start(self.rival.model)
 
     @cached_property
-    def _of_less(self) -> tuple[ExtendedModel, list[Array]]:
+    def _without_start(self) -> tuple[ExtendedModel, list[Array]]:
+        """The model of the cause without it and its rows of this data, from which each refit starts."""
         model = self.cause.model
-        return self._begun(model.without(*({*model.names} - {*self.without.model.names})))
+        return self._warm_start(model.without(*({*model.names} - {*self.without.model.names})))
 
-    def _begun(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array]]:
-        """Where a fit begins, whatever protocol is run, and what it begins with of this data."""
+    def _warm_start(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array]]:
+        """``model`` within its bounds, and its residuals and slopes over this data, which serve every protocol."""
         start = within_bounds(model)
         return start, [rows_of(start, one) for one in self.cause.likelihood.sessions]
 
 
 @lru_cache(maxsize=len(EXPERIMENTS))
-def _foretold(unit: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:
-    """What the unit would read, prepared; kept, since each of its doubtful causes asks for the same protocols."""
+def _predicted_session(
+    unit: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds
+) -> Session:
+    """The prepared recording that the unit is predicted to give; cached, since each doubtful cause asks for it."""
     (session,), _ = sessions_on(unit, [protocol], unit.full_scale_load_n, sample_time_s, thresholds)
     return session

@@ -1,9 +1,9 @@
-"""The reference load without its noise, corners unchanged.
+"""The reference load without its noise, with its corners unchanged.
 
-Noise on the load imitates physics: a simulation that smooths it (a lag), or that keeps it out of rests (a dead band),
-fits better for no reason of the unit's. A testing machine's load is straight lines with corners; so each sample is
-taken from the best of several straight lines through its neighbourhood: centred, ending or beginning at it, long or
-short, as far as what a line leaves is noise (after the crossing-lines idea of Katkovnik 1999).
+Noise on the load imitates physics: a simulation that smooths it (a lag), or that removes it from rests (a dead band),
+fits better for no reason of the unit's. The load of a testing machine consists of straight lines with corners. So each
+sample is taken from the best of several lines through its neighbourhood, centred, ending or beginning there, long or
+short, as long as the residual of the line is noise (after the crossing-lines idea of Katkovnik 1999).
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import is_switched, robust_sd
 
-LATER = 9  # samples within which a reading is seen to follow, a resolution
-PLACES_PER_TAP = 3  # with as many, unrelated noise is never followed by nearly all
-FEW_TAPS = 300  # of a window: with more, blocks in the frequency domain take less time than sums
+LATER = 9  # the largest delay in samples at which a reading is seen to follow, a resolution
+PLACES_PER_TAP = 3  # with as many samples for each tap, unrelated noise hardly ever seems followed
+FEW_TAPS = 300  # window length from which convolution by FFT is faster
 
 
 def noise_sd(signal: Array, thresholds: Thresholds) -> float:
-    """White noise's standard deviation from third differences, which no ramp or bend reaches.
+    """Standard deviation of white noise from third differences, in which ramps and bends vanish.
 
-    The median finds the scale, the mean square of what noise reaches the value: on a converter's
-    quantisation grid a median is a whole number of steps. A load that is switched between a few levels has none.
+    The median gives the scale, and the mean square of differences within noise the value, since on a quantisation grid
+    the median is a whole number of steps. 0 for a load that is switched between a few levels.
     """
     if signal.size < 10 or is_switched(signal, thresholds.few, thresholds.false_alarm):
         return 0.0
@@ -33,15 +33,15 @@ def noise_sd(signal: Array, thresholds: Thresholds) -> float:
 
 
 def _are_of_noise(third: Array, thresholds: Thresholds) -> Mask:
-    """(n,) which ``third`` differences are no larger than those of white noise: corners' are."""
+    """(n,) True for ``third`` differences that white noise may reach; those at corners are larger."""
     return np.asarray(np.abs(third) <= largest_of_noise(third.size, thresholds) * robust_sd(third))
 
 
 def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float:
-    """Share of what is taken for a load's noise that its ``reading`` (n,) follows at once or some samples later.
+    """Share of a load's supposed noise that the ``reading`` (n,) follows, at once or some samples later.
 
-    That is no noise: a shaker, a vehicle or a person who sways moves a load as fast. Of the variance of third
-    differences without the largest; 0 where it is not nearly all (``same``), or where too few are left to tell.
+    Such noise is real: a shaker, a vehicle or a swaying person moves a load as fast. The share is of the variance of
+    third differences without the largest; 0 where it is not nearly all (``same``), or where too few are left.
     """
     moved, read = np.diff(load, 3), np.diff(reading, 3)
     if moved.size <= LATER:
@@ -61,15 +61,15 @@ def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float
 
 
 def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds) -> tuple[Array, float]:
-    """The load (n,) from lines through its neighbourhood, and what is left of its noise's standard deviation ``sd``."""
-    least = thresholds.few + 2  # samples that a line is drawn through: a few more than it has numbers
+    """The load (n,) without noise of standard deviation ``sd``, and the standard deviation of what remains of it."""
+    least = thresholds.few + 2  # samples of a line: a few more than it has parameters
     if sd == 0.0 or load.size < thresholds.least_samples:
         return load, sd
     best = load.copy()
     variance = np.ones(load.size)
     squares = load - load.mean()
     unlikely = largest_of_noise(1, thresholds)
-    # Within which an echo lies; where corners are near, a half and a quarter of it.
+    # The time within which an echo lies; near corners a half and a quarter of it.
     for share in (1.0, 0.5, 0.25):
         half = max(round(share * thresholds.echo_s / step_s), least // 2)
         n = 2 * half + 1
@@ -77,7 +77,7 @@ def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds)
             continue
         mean, slope, left, spread = _lines(squares, half)
         fits = left <= sd**2 * (1.0 + unlikely * np.sqrt(2.0 / (n - 2)))
-        for place in (half, 2 * half, 0):  # of the sample within its neighbourhood
+        for place in (half, 2 * half, 0):  # the sample's place in its neighbourhood
             away = place - half
             leverage = 1.0 / n + away**2 / spread
             here = slice(place, place + fits.size)
@@ -88,9 +88,9 @@ def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds)
 
 
 def _lines(signal: Array, half: int) -> tuple[Array, Array, Array, float]:
-    """Least squares lines through every 2 ``half`` + 1 neighbours of a signal (n,).
+    """Least-squares lines through every 2 ``half`` + 1 neighbours of a signal (n,).
 
-    Mean, slope and residual variance, (n - 2 half,) each; and the places' sum of squares about their middle.
+    Mean, slope and residual variance, (n - 2 half,) each, and the sum of squares of the places about their middle.
     """
     k = np.arange(-half, half + 1, dtype=float)
     spread = float(np.sum(k**2))

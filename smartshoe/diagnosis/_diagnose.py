@@ -1,4 +1,4 @@
-"""What recordings may be diagnosed, and what is said of those that may not; `diagnose`."""
+"""`diagnose`: which recordings may be diagnosed, and the reasons for those that may not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.diagnosis._characteristic import characteristic_of, has_two_signs
 from smartshoe.diagnosis._procedure import diagnosed
 from smartshoe.diagnosis._result import Diagnosis
-from smartshoe.diagnosis._session import pastless
+from smartshoe.diagnosis._session import without_predecessor
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
@@ -67,7 +67,9 @@ def diagnose(
     alone = [mask & ~shared[k].at if k in shared else mask for k, mask in enumerate(integrity.usable)]
     copies = {k: one.says for k, one in shared.items() if alone[k].sum() < decided.least_samples}
     left_out = copies | dict(zip(useless, integrity.refusals, strict=True))
-    pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
+    pulled = {
+        k: said for k, one in enumerate(everything) if k not in left_out and (said := _pulled_reason(one, decided))
+    }
     if any(k < count for k in pulled):
         return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
     left_out |= pulled
@@ -77,12 +79,16 @@ def diagnose(
     found = diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
     reasons = tuple(left_out.values())
     why_not = (*reasons, *(one.says for k, one in shared.items() if k not in left_out))
-    limits = (*(f"left out: {why}" for why in why_not), *_without(everything, count, left_out), *found.limits)
+    limits = (
+        *(f"left out: {why}" for why in why_not),
+        *_limit_missing_predecessor(everything, count, left_out),
+        *found.limits,
+    )
     return replace(found, limits=limits, left_out=reasons)
 
 
-def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
-    """Why a recording is none of a unit that is pressed, or None."""
+def _pulled_reason(recording: Recording, thresholds: Thresholds) -> str | None:
+    """The reason where a recording's load has both signs, which no pressed unit has; else None."""
     low, high = ends = np.percentile(recording.force_n, [1, 99])
     if not has_two_signs(ends, thresholds):
         return None
@@ -93,14 +99,14 @@ def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
     )
 
 
-def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
-    """What is said where recordings that others need are ``left_out``, by place, or were not given at all.
+def _limit_missing_predecessor(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
+    """Sentences where recordings that others continue are ``left_out``, by place, or were not given.
 
-    The first ``count`` were to be fitted.
+    The first ``count`` were to be fitted. Also where no recording is left to judge on.
     """
     said = []
     names = {recordings[k].name for k in left_out}
-    for one in pastless([one for k, one in enumerate(recordings) if k not in left_out]):
+    for one in without_predecessor([one for k, one in enumerate(recordings) if k not in left_out]):
         earlier = one.metadata["continues"]
         why = f"which is not among the recordings: it is taken as the unit's first after a rest (give {earlier} too)"
         if earlier in names:
@@ -116,6 +122,7 @@ def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int,
 def _refused(
     recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str], thresholds: Thresholds
 ) -> Diagnosis:
+    """The diagnosis with the verdict "refused", for the reasons ``refusals``."""
     sensors = recordings[0].sensors
     unit = sensors[0].unit.symbol if sensors else ""
     return Diagnosis(
@@ -125,12 +132,15 @@ def _refused(
         0.0,
         0.0,
         data_faults=integrity.faults,
-        limits=(*refusals, *(said for one in recordings if (said := _seen(one, thresholds)) is not None)),
+        limits=(
+            *refusals,
+            *(said for one in recordings if (said := _known_without_model(one, thresholds)) is not None),
+        ),
         thresholds=thresholds,
     )
 
 
-def _seen(recording: Recording, thresholds: Thresholds) -> str | None:
-    """What is known of a recording without a model."""
+def _known_without_model(recording: Recording, thresholds: Thresholds) -> str | None:
+    """What can be said of a recording without a model: a decay, or a static characteristic."""
     decay = decay_of(recording, thresholds)
     return decay.says if decay is not None else characteristic_of(recording, thresholds)

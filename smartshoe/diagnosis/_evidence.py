@@ -1,27 +1,28 @@
-"""How well a set of effects accounts for the data: a marginal likelihood in which no equation is exact.
+"""The evidence for a set of effects: a marginal likelihood in which no equation is taken as exact.
 
-With the reading's residual y, in standard deviations of what counts as noise, and everything linear in it,
+With the residual y of the reading, in standard deviations of the noise, and everything linear in it,
 
     y = X0 b + sum over all candidates x_j s_j + sum over e in S ( x_e a_e + Phi_e w_e ) + noise
 
-* b ~ N(0, 1), the baseline's own changes: anything up to full scale, which is flat;
-* s_j ~ N(0, imperfection^2): what is immaterial may always be there, of any kind, and needs no name;
-* a_e ~ N(0, strength_sd^2): the effects in S (spike and slab: George and McCulloch 1993);
-* w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
+* b ~ N(0, 1): changes of the baseline, anything up to full scale, so that this prior is practically flat;
+* s_j ~ N(0, imperfection^2): a small imperfection of any kind may always be there, and needs no name;
+* a_e ~ N(0, strength_sd^2): the strengths of the effects in S (spike and slab: George and McCulloch 1993);
+* w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's size, in the
   directions in which equations of its kind depart (Kennedy and O'Hagan 2001).
 
-With C0 the covariance of y for no effect, and U the columns x_e and Phi_e of S, of which S adds the prior variances D,
+Let C0 be the covariance of y without any effect, U the columns x_e and Phi_e of S, and D their prior variances. Then
 
     -2 log p(y | S) = y' C0^-1 y + log det C0 - q' D (I + R D)^-1 q + log det(I + R D),
 
-R = U' C0^-1 U and q = U' C0^-1 y. Both are taken once for all columns, so that a set costs a factorisation of its own
-few.
+with R = U' C0^-1 U and q = U' C0^-1 y. R and q are computed once for all columns, so that a set only costs a
+factorisation of its own few columns.
 
-Once a set is chosen, each of its effects is weighed against nothing in its place, also under a wider model error, since
-a small companion may be no more than another effect's error of shape: Phi_e with the columns of all other equations of
-the family (``of_any_law``), or made of the whole effect instead of what the baseline cannot follow of it (``of_all``),
-as of a gain that settles more at high loads, which leaves a curve. The search uses neither: there the other equations
-compete themselves, and a wide model error would hide effects of other families.
+Once a set is chosen, each effect is compared with nothing in its place also under two wider model errors, since a small
+effect may be only the error of shape of another one. Either Phi_e is extended by the columns of all other equations of
+the family (``of_any_law``), or it is built from the whole effect instead of the part that the baseline cannot follow
+(``of_whole_effect``); an example of the latter is a gain that settles more at high loads, which leaves a curve. The
+search uses neither: there the other equations compete themselves, and a wide model error would hide effects of other
+families.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from smartshoe.diagnosis._sensitivity import (
     directions,
     nuisance_precision,
     ridged,
-    where,
+    rows_where,
 )
 from smartshoe.diagnosis._step_columns import StepColumns
 
@@ -53,37 +54,38 @@ Members = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """``score`` is -2 log of the evidence times the prior odds of the set; ``strengths`` a member's (k,) each.
+    """A set of effects with its score and its estimates.
 
-    ``sizes``: rms by which each member moves the reading beyond what the baseline absorbs; ``departed``: rms of its
-    fitted departure, in standard deviations of its prior. ``together``: rms by which all members move the reading.
+    ``score`` is -2 log of evidence times prior odds, so that lower is better. ``strengths`` are (k,) for each member,
+    ``sizes`` the rms by which each moves the reading beyond what the baseline absorbs, ``together`` that of all
+    members. ``departure_sds`` is each member's fitted departure, rms in standard deviations of its prior.
     """
 
     members: Members
     score: float
     strengths: tuple[Array, ...]
     sizes: tuple[float, ...]
-    departed: tuple[float, ...]
+    departure_sds: tuple[float, ...]
     together: float = 0.0
 
     def without(self, member: int) -> Members:
-        """The set but for one of its members."""
+        """The set without one of its members."""
         return tuple(m for m in self.members if m != member)
 
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Columns ``seen`` (n, k) a session, over what is fitted; ``past`` (k, l), their products with its l nuisances."""
+    """Columns ``values`` (n, k) of each session over the fitted samples, and their products ``on_nuisances`` (k, l)."""
 
-    seen: Sequence[Array]
-    past: Sequence[Array]
+    values: Sequence[Array]
+    on_nuisances: Sequence[Array]
 
 
 @dataclass(frozen=True, eq=False)
 class _Departures:
-    """A member's departures, and their ``places`` among all columns.
+    """A member's departure ``columns`` and their ``places`` among all columns.
 
-    ``half`` (p, k): what is taken out of their inner products by all that is there without any effect is its square.
+    ``half`` (p, k): its square is what the baseline and the imperfections take out of their inner products.
     """
 
     columns: _Columns
@@ -92,239 +94,252 @@ class _Departures:
 
 
 class Evidence:
-    """The evidence for sets of candidates of ``given`` under white noise of ``noise_sd``, a share of full scale.
+    """The evidence for sets of candidates under white noise of ``noise_sd``, a share of full scale.
 
-    ``of_all``: equations depart in the whole effect, not in what the baseline cannot follow of it.
+    ``of_whole_effect``: equations depart in the whole effect, not only in what the baseline cannot follow of it.
     """
 
-    def __init__(self, given: Linearised, noise_sd: float, *, of_all: bool = False) -> None:
-        self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
-        self._of_all = of_all
-        self._seen: dict[tuple[Members, bool], Posterior] = {}
+    def __init__(self, linearisation: Linearised, noise_sd: float, *, of_whole_effect: bool = False) -> None:
+        self.linearisation, self.noise_sd, self.thresholds = linearisation, noise_sd, linearisation.thresholds
+        self._of_whole_effect = of_whole_effect
+        self._posteriors: dict[tuple[Members, bool], Posterior] = {}
         self._extensions: dict[Members, list[tuple[float, int, Array]]] = {}
-        parts = list(zip(given.products, given.nuisance_counts, strict=True))
+        parts = list(zip(linearisation.products, linearisation.nuisance_counts, strict=True))
         self._inverse = [
-            np.linalg.inv(ridged(products[-n:, -n:] + noise_sd**2 * nuisance_precision(one, given.model)))
-            for (products, n), one in zip(parts, given.sessions, strict=True)
+            np.linalg.inv(ridged(products[-n:, -n:] + noise_sd**2 * nuisance_precision(one, linearisation.model)))
+            for (products, n), one in zip(parts, linearisation.sessions, strict=True)
         ]
-        own_past = [products[:-n, -n:] for products, n in parts]
-        self._all = _Columns(given.seen, own_past)
-        self.gram = self._free(np.sum([products[:-n, :-n] for products, n in parts], axis=0), own_past, own_past)
-        # The visible part of each column: what the baseline's own changes cannot follow.
-        own = slice(1, 1 + given.own)
-        raw = given.gram
+        on_nuisances = [products[:-n, -n:] for products, n in parts]
+        self._all_columns = _Columns(linearisation.fitted_rows, on_nuisances)
+        self.gram = self._without_nuisances(
+            np.sum([products[:-n, :-n] for products, n in parts], axis=0), on_nuisances, on_nuisances
+        )
+        # The visible part of each column, which changes of the baseline cannot follow.
+        own = slice(1, 1 + linearisation.baseline_count)
+        raw = linearisation.gram
         inverse = np.linalg.pinv(raw[own, own], rcond=1e-10, hermitian=True)
         self._absorbed = inverse @ raw[own]
         visible = raw - raw[:, own] @ self._absorbed
-        count = sum(int(s.fitted.sum()) for s in given.sessions)
+        count = sum(int(s.fitted.sum()) for s in linearisation.sessions)
         self.raw = visible / count
-        # What is there without any effect: the baseline's own changes, and what is immaterial.
+        # Prior standard deviations without any effect: changes of the baseline, and small imperfections.
         self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.imperfection)
-        self._sds[: given.own] = 1.0
-        for one in given.candidates:
-            if one.effect.why_unnamed:  # what no law does is no small imperfection of a good unit
+        self._sds[: linearisation.baseline_count] = 1.0
+        for one in linearisation.candidates:
+            if one.effect.why_unnamed:  # a behaviour that no law has is not an imperfection of a good unit
                 self._sds[np.array(one.columns) - 1] = 0.0
         inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
         inner.flat[:: inner.shape[0] + 1] += 1.0
         self._factor = _factor(inner)
-        self._half = self._taken_out(self.gram)
+        self._half = self._half_solved(self.gram)
         self._directions = directions(self.thresholds)
-        self._first = self.gram.shape[0]  # of all departures, a candidate's after the other's
-        # Of the departures little is ever asked for, and only that takes room.
-        self._reduced = np.zeros((self._first + self._directions * len(given.candidates),) * 2)
-        self._reduced[: self._first, : self._first] = self.gram - self._half.T @ self._half
-        self._nothing = float(self._reduced[0, 0]) + 2.0 * float(np.sum(np.log(np.diag(self._factor))))
+        self._column_count = self.gram.shape[0]  # where departures begin, candidate after candidate
+        # Most of the departures are never asked for, and only those asked for are computed.
+        self._reduced = np.zeros((self._column_count + self._directions * len(linearisation.candidates),) * 2)
+        self._reduced[: self._column_count, : self._column_count] = self.gram - self._half.T @ self._half
+        self._null_score = float(self._reduced[0, 0]) + 2.0 * float(np.sum(np.log(np.diag(self._factor))))
         self._departures: dict[int, _Departures] = {}
-        self._known: set[tuple[int, int]] = set()
-        effects = {one.name for one in given.candidates}
+        self._known_pairs: set[tuple[int, int]] = set()
+        effects = {one.name for one in linearisation.candidates}
         self.odds = 2.0 * math.log(len(effects) / self.thresholds.false_name)
 
-    def _taken_out(self, cross: Array) -> Array:
-        """(p, k) of inner products (1 + p, k) with target and p columns: its square is what these account for."""
+    def _half_solved(self, cross: Array) -> Array:
+        """(p, k) of products (1 + p, k) with target and p columns: its square is what these p columns explain."""
         inside = self._sds[:, None] * cross[1:]
         return np.asarray(solve_triangular(self._factor, inside, lower=True, check_finite=False))
 
-    def _free(self, products: Array, left: Sequence[Array], right: Sequence[Array]) -> Array:
-        """(l, r) inner products, in units of the noise's variance, with what nuisances follow taken out.
+    def _without_nuisances(self, products: Array, left: Sequence[Array], right: Sequence[Array]) -> Array:
+        """(l, r) inner products with the nuisances projected out, in units of the noise variance.
 
-        ``left`` (l, k) and ``right`` (r, k) a session are the columns' inner products with its nuisances.
+        ``left`` (l, k) and ``right`` (r, k) are, for each session, the columns' products with its nuisances.
         """
         parts = zip(left, right, self._inverse, strict=True)
         return np.asarray((products - sum(a @ inverse @ b.T for a, b, inverse in parts)) / self.noise_sd**2)
 
-    def _between(self, left: _Columns, right: _Columns) -> Array:
-        """The same of two sets of columns."""
-        products = np.asarray(sum(a.T @ b for a, b in zip(left.seen, right.seen, strict=True)))
-        return self._free(products, left.past, right.past)
+    def _cross_products(self, left: _Columns, right: _Columns) -> Array:
+        """(l, r) inner products of two sets of columns, with the nuisances projected out."""
+        products = np.asarray(sum(a.T @ b for a, b in zip(left.values, right.values, strict=True)))
+        return self._without_nuisances(products, left.on_nuisances, right.on_nuisances)
 
     def visible_rms(self, columns: Sequence[int], strengths: Array) -> float:
-        """Rms by which strengths of these columns move the reading beyond what the baseline absorbs."""
+        """Rms by which these strengths of the columns move the reading beyond what the baseline absorbs."""
         index = np.asarray(columns, dtype=np.intp)
         return math.sqrt(max(float(strengths @ self.raw[index[:, None], index] @ strengths), 0.0))
 
-    def likeness(self, alone: Sequence[int]) -> Array:
-        """How alike (k, k) ``alone`` k candidates look in this data: 1 in every sample, 0 not at all.
+    def likeness(self, members: Sequence[int]) -> Array:
+        """(k, k) similarity of the candidates, each fitted alone: 1 where they look the same in every sample.
 
-        Absolute cosine of what each by itself would add that the baseline and the nuisances cannot follow.
+        It is the absolute cosine of what each adds beyond the baseline and the nuisances.
         """
-        made = np.zeros((self.raw.shape[0], len(alone)))
-        for k, member in enumerate(alone):
-            made[list(self.given.candidates[member].columns), k] = self.posterior((member,)).strengths[0]
+        made = np.zeros((self.raw.shape[0], len(members)))
+        for k, member in enumerate(members):
+            made[list(self.linearisation.candidates[member].columns), k] = self.posterior((member,)).strengths[0]
         return np.asarray(np.minimum(np.abs(cosines(made.T @ self.raw @ made)), 1.0))
 
     def _departures_of(self, members: Members) -> list[range]:
-        """Where the columns of members' departures stand, made when they are first asked for."""
-        self.make_ready(members)
+        """The places of the members' departure columns, computed when they are first needed."""
+        self.prepare_departures(members)
         for pair in combinations(members, 2):
-            if pair not in self._known:
-                self._known.add(pair)
+            if pair not in self._known_pairs:
+                self._known_pairs.add(pair)
                 one, other = (self._departures[member] for member in pair)
-                found = self._between(one.columns, other.columns) - one.half.T @ other.half
+                found = self._cross_products(one.columns, other.columns) - one.half.T @ other.half
                 self._reduced[one.places, other.places] = found
                 self._reduced[other.places, one.places] = found.T
         there = [self._departures[member].places for member in members]
         return [range(places.start, places.stop) for places in there]
 
-    def make_ready(self, members: Collection[int]) -> None:
-        """Make the departures of these candidates: all at once they cost half of one after another."""
+    def prepare_departures(self, members: Collection[int]) -> None:
+        """Compute the departures of these candidates; all at once they cost half as much as one after another."""
         missing = [member for member in dict.fromkeys(members) if member not in self._departures]
         if not missing:
             return
-        each = [self._departing(member) for member in missing]
+        each = [self._departure_columns(member) for member in missing]
         together = _Columns(
-            [np.hstack(seen) for seen in zip(*(one.seen for one in each), strict=True)],
-            [np.vstack(past) for past in zip(*(one.past for one in each), strict=True)],
+            [np.hstack(values) for values in zip(*(one.values for one in each), strict=True)],
+            [np.vstack(on_nuisances) for on_nuisances in zip(*(one.on_nuisances for one in each), strict=True)],
         )
-        cross = self._between(self._all, together)
+        cross = self._cross_products(self._all_columns, together)
         count = self._directions
         for k, (member, own) in enumerate(zip(missing, each, strict=True)):
-            beside, first = cross[:, k * count : (k + 1) * count], self._first + member * count
-            half, places = self._taken_out(beside), slice(first, first + count)
-            self._reduced[: self._first, places] = beside - self._half.T @ half
-            self._reduced[places, : self._first] = self._reduced[: self._first, places].T
-            self._reduced[places, places] = self._between(own, own) - half.T @ half
+            cross_terms, first = cross[:, k * count : (k + 1) * count], self._column_count + member * count
+            half, places = self._half_solved(cross_terms), slice(first, first + count)
+            self._reduced[: self._column_count, places] = cross_terms - self._half.T @ half
+            self._reduced[places, : self._column_count] = self._reduced[: self._column_count, places].T
+            self._reduced[places, places] = self._cross_products(own, own) - half.T @ half
             self._departures[member] = _Departures(own, places, half)
 
-    def _departing(self, member: int) -> _Columns:
-        given = self.given
-        columns = list(given.candidates[member].columns)
+    def _departure_columns(self, member: int) -> _Columns:
+        """The directions in which one candidate's equation may depart."""
+        linearisation = self.linearisation
+        columns = list(linearisation.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
-        whole = [rows[:, columns] @ weights for rows in given.rows]
-        signatures = whole if self._of_all else self._visible(whole, columns, weights)
-        return self._columns(departures(given, signatures))
+        whole = [rows[:, columns] @ weights for rows in linearisation.rows]
+        signatures = whole if self._of_whole_effect else self._visible(whole, columns, weights)
+        return self._columns(departures(linearisation, signatures))
 
     def _columns(self, whole: Sequence[Array]) -> _Columns:
-        """``whole`` (n, k) a session, where it may be fitted."""
-        seen = [where(one.fitted, part) for one, part in zip(self.given.sessions, whole, strict=True)]
-        return _Columns(seen, [part.T @ own for part, own in zip(seen, self.given.past, strict=True)])
+        """Columns of ``whole`` (n, k) for each session, over the fitted samples."""
+        values = [rows_where(one.fitted, part) for one, part in zip(self.linearisation.sessions, whole, strict=True)]
+        return _Columns(
+            values, [part.T @ own for part, own in zip(values, self.linearisation.fitted_nuisances, strict=True)]
+        )
 
     def _visible(self, whole: Sequence[Array], columns: Sequence[int], weights: Array) -> list[Array]:
-        """Of ``whole`` contributions (n,) a session what the baseline and the nuisances cannot follow."""
-        given, absorbed = self.given, self._absorbed[:, columns] @ weights
+        """The part (n,) of contributions ``whole``, for each session, that baseline and nuisances cannot follow."""
+        linearisation, absorbed = self.linearisation, self._absorbed[:, columns] @ weights
         found = []
-        for every, rows, own, products in zip(whole, given.rows, given.nuisances, given.products, strict=True):
-            past = products[-own.shape[1] :]
-            known = past[:, columns] @ weights - past[:, 1 : 1 + given.own] @ absorbed
-            followed = own @ np.linalg.solve(ridged(past[:, -own.shape[1] :]), known)
-            found.append(every - rows[:, 1 : 1 + given.own] @ absorbed - followed)
+        for every, rows, own, products in zip(
+            whole, linearisation.rows, linearisation.nuisances, linearisation.products, strict=True
+        ):
+            on_nuisances = products[-own.shape[1] :]
+            known = (
+                on_nuisances[:, columns] @ weights - on_nuisances[:, 1 : 1 + linearisation.baseline_count] @ absorbed
+            )
+            followed = own @ np.linalg.solve(ridged(on_nuisances[:, -own.shape[1] :]), known)
+            found.append(every - rows[:, 1 : 1 + linearisation.baseline_count] @ absorbed - followed)
         return found
 
     def _direction(self, columns: Sequence[int]) -> Array:
-        """Of several strengths the direction that the data asks for, of unit length."""
-        index = [*range(1, 1 + self.given.own), *columns]
+        """Of an effect with several strengths, the direction (k,) that the data asks for, of unit length."""
+        index = [*range(1, 1 + self.linearisation.baseline_count), *columns]
         part = self.gram[np.ix_(index, index)]
-        part = part + np.diag([1.0] * self.given.own + [self.thresholds.strength_sd**-2] * len(columns))
-        found = np.linalg.solve(part, self.gram[index, 0])[self.given.own :]
+        part = part + np.diag(
+            [1.0] * self.linearisation.baseline_count + [self.thresholds.strength_sd**-2] * len(columns)
+        )
+        found = np.linalg.solve(part, self.gram[index, 0])[self.linearisation.baseline_count :]
         size = float(np.linalg.norm(found))
         return np.asarray(found / size) if size > 0 else np.ones(len(columns)) / math.sqrt(len(columns))
 
     def posterior(self, members: Members, *, of_any_law: bool = False) -> Posterior:
-        """The evidence of the set ``members`` (numbers of candidates); cached.
+        """The posterior of a set, given by the candidates' numbers; cached.
 
-        ``of_any_law``: their equations may depart towards all others of their families.
+        ``of_any_law``: the equations may also depart towards all others of their families.
         """
         members = tuple(sorted(members))
-        asked = members, of_any_law
-        if asked not in self._seen:
-            pull, fall = self._solved(members, None)
-            # How far an equation departs goes with its size, which is first found as if it were exact.
+        key = members, of_any_law
+        if key not in self._posteriors:
+            solution, fall = self._set_solution(members, None)
+            # The departure's prior is in proportion to the strength, which is first found as if the equation were
+            # exact.
             for _ in range(2 if members else 0):
-                pull, fall = self._solved(members, self._strengths(members, pull), of_any_law=of_any_law)
-            self._seen[asked] = self._described(members, pull, fall)
-        return self._seen[asked]
+                solution, fall = self._set_solution(members, self._strengths(members, solution), of_any_law=of_any_law)
+            self._posteriors[key] = self._posterior_of(members, solution, fall)
+        return self._posteriors[key]
 
-    def score_beside(self, members: Members) -> float:
-        """The score of a set with what the freedom of the nuisances costs, but for the offsets', whose prior is flat.
+    def comparable_score(self, members: Members) -> float:
+        """The score of a set including the cost of the nuisances, so that different nuisances can be compared.
 
-        -2 log of the evidence under any choice of the other nuisances: these can be weighed against one another.
+        The offsets, whose prior is flat, are left out of that cost.
         """
         free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
         return self.posterior(members).score - float(sum(free))
 
-    def falls_beside(self, members: Members, steps: Sequence[StepColumns]) -> Array:
-        """By how much a set's score falls with each of the sessions' ``steps``, in order, of unit prior."""
-        past = [one.products(own) for one, own in zip(steps, self.given.past, strict=True)]
-        cross = self._with_steps(self._all, steps, past)
-        half = self._taken_out(cross)
+    def score_falls_with_steps(self, members: Members, steps: Sequence[StepColumns]) -> Array:
+        """(steps,) fall of a set's score when each of the sessions' ``steps``, of unit prior, joins the nuisances."""
+        on_nuisances = [one.products(own) for one, own in zip(steps, self.linearisation.fitted_nuisances, strict=True)]
+        cross = self._with_steps(self._all_columns, steps, on_nuisances)
+        half = self._half_solved(cross)
         free = cross - self._half.T @ half
         best = self.posterior(members)
-        index, sds = self._widened(best.members, best.strengths)
+        index, sds = self._columns_and_sds(best.members, best.strengths)
         departures = [self._departures[member] for member in best.members]
         strengths = index[: index.size - self._directions * len(departures)]
-        also = [self._with_steps(one.columns, steps, past) - one.half.T @ half for one in departures]
-        beside = sds[:, None] * np.vstack([free[strengths], *also])
-        factor, pull, _ = self._moved(index, sds)
-        taken = solve_triangular(factor, beside, lower=True, check_finite=False) if index.size else beside
-        each = zip(steps, past, self._inverse, strict=True)
+        also = [self._with_steps(one.columns, steps, on_nuisances) - one.half.T @ half for one in departures]
+        cross_terms = sds[:, None] * np.vstack([free[strengths], *also])
+        factor, solution, _ = self._solve(index, sds)
+        taken = solve_triangular(factor, cross_terms, lower=True, check_finite=False) if index.size else cross_terms
+        each = zip(steps, on_nuisances, self._inverse, strict=True)
         power = [one.power - np.einsum("lk,lm,mk->k", own, inverse, own) for one, own, inverse in each]
         alone = np.concatenate(power) / self.noise_sd**2
         left = np.maximum(alone - np.sum(half**2, axis=0) - np.sum(taken**2, axis=0), 0.0)
-        asked = free[0] - beside.T @ pull
-        return np.asarray(asked**2 / (1.0 + left) - np.log1p(left))
+        projected_target = free[0] - cross_terms.T @ solution
+        return np.asarray(projected_target**2 / (1.0 + left) - np.log1p(left))
 
-    def _with_steps(self, columns: _Columns, steps: Sequence[StepColumns], past: Sequence[Array]) -> Array:
-        """`_free` of columns and all ``steps``, whose products with their sessions' nuisances are ``past``."""
-        each = zip(columns.seen, columns.past, steps, past, self._inverse, strict=True)
-        parts = [one.products(seen) - own @ inverse @ beside for seen, own, one, beside, inverse in each]
+    def _with_steps(self, columns: _Columns, steps: Sequence[StepColumns], on_nuisances: Sequence[Array]) -> Array:
+        """Products of columns with all ``steps``, nuisances projected out; ``on_nuisances`` are those of the steps."""
+        each = zip(columns.values, columns.on_nuisances, steps, on_nuisances, self._inverse, strict=True)
+        parts = [one.products(values) - own @ inverse @ cross_terms for values, own, one, cross_terms, inverse in each]
         return np.hstack(parts) / self.noise_sd**2
 
     @cached_property
     def of_whole_effects(self) -> Evidence:
-        """The same where equations depart in all that their effects add."""
-        return Evidence(self.given, self.noise_sd, of_all=True)
+        """The same evidence where equations may depart in the whole effect."""
+        return Evidence(self.linearisation, self.noise_sd, of_whole_effect=True)
 
-    def _solved(
+    def _set_solution(
         self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
     ) -> tuple[Array, float]:
-        """`_moved` by a set: the solution (k,), and by how much -2 log evidence falls."""
-        _, pull, fall = self._moved(*self._widened(members, strengths, of_any_law=of_any_law))
-        return pull, fall
+        """The solution (k,) of a set by `_solve`, and the fall of -2 log evidence."""
+        _, solution, fall = self._solve(*self._columns_and_sds(members, strengths, of_any_law=of_any_law))
+        return solution, fall
 
-    def _strengths(self, members: Members, pull: Array) -> tuple[Array, ...]:
-        """Each member's (k,), of a solution that begins with them."""
-        ends = np.cumsum([len(self.given.candidates[m].columns) for m in members], dtype=np.intp)
-        return tuple(np.split(self.thresholds.strength_sd * pull[: ends[-1]], ends[:-1])) if members else ()
+    def _strengths(self, members: Members, solution: Array) -> tuple[Array, ...]:
+        """Each member's strengths (k,), which stand first in ``solution``."""
+        ends = np.cumsum([len(self.linearisation.candidates[m].columns) for m in members], dtype=np.intp)
+        return tuple(np.split(self.thresholds.strength_sd * solution[: ends[-1]], ends[:-1])) if members else ()
 
-    def _described(self, members: Members, pull: Array, fall: float) -> Posterior:
-        columns = [self.given.candidates[m].columns for m in members]
-        each = self._strengths(members, pull)
+    def _posterior_of(self, members: Members, solution: Array, fall: float) -> Posterior:
+        """The posterior of a set from its solution and the ``fall`` of -2 log evidence."""
+        columns = [self.linearisation.candidates[m].columns for m in members]
+        each = self._strengths(members, solution)
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
-        own, beyond = np.split(pull, [sum(map(len, columns))])
-        beyond = beyond[: len(members) * self._directions]  # after them come those towards other laws
-        departed = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
+        own, beyond = np.split(solution, [sum(map(len, columns))])
+        beyond = beyond[: len(members) * self._directions]  # the departures towards other laws come last
+        departure_sds = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
         together = self.visible_rms([c for few in columns for c in few], self.thresholds.strength_sd * own)
-        score = self._nothing - fall + self.odds_of(members)
-        return Posterior(members, score, each, sizes, tuple(departed or [0.0] * len(members)), together)
+        score = self._null_score - fall + self.odds_of(members)
+        return Posterior(members, score, each, sizes, tuple(departure_sds or [0.0] * len(members)), together)
 
-    def _widened(
+    def _columns_and_sds(
         self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
     ) -> tuple[Index, Array]:
-        """A set's columns, and the standard deviations (k,) of their coefficients.
+        """The columns of a set, and the prior standard deviations (k,) of their coefficients.
 
-        Its strengths' first, then each member's departures in proportion to ``strengths``, where they are known; last,
-        ``of_any_law``, those towards the others of its family.
+        First the strengths, then each member's departures in proportion to ``strengths`` if these are known. With
+        ``of_any_law`` the departures towards the other laws of each family follow.
         """
-        index = [c for m in members for c in self.given.candidates[m].columns]
+        index = [c for m in members for c in self.linearisation.candidates[m].columns]
         sds = [self.thresholds.strength_sd] * len(index)
         if strengths is not None:
             ways: list[Sequence[int]] = [*self._departures_of(members)]
@@ -336,24 +351,24 @@ class Evidence:
         return np.array(index, dtype=np.intp), np.array(sds)
 
     def _others_of(self, member: int) -> list[int]:
-        """The columns of all other equations and blocks of a member's family, but those that may be beside it."""
-        own = self.given.candidates[member]
-        family = (one for one in self.given.candidates if one.effect.family == own.effect.family)
+        """The columns of all other laws and blocks of a member's family, except those that may stand beside it."""
+        own = self.linearisation.candidates[member]
+        family = (one for one in self.linearisation.candidates if one.effect.family == own.effect.family)
         return [column for one in family if one.slot == own.slot and one.name != own.name for column in one.columns]
 
-    def _moved(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
-        """Factor of I + D R, its solution (k,) of D q, and by how much -2 log evidence falls; D by halves each side."""
+    def _solve(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
+        """Cholesky factor of I + sqrt(D) R sqrt(D), its solution, and the fall of -2 log evidence."""
         inner = self._reduced[index[:, None], index] * (sds[:, None] * sds)
         inner.flat[:: index.size + 1] += 1.0
         factor = _factor(inner)
-        asked = sds * self._reduced[index, 0]
-        pull = np.asarray(dpotrs(factor, asked, lower=1)[0]) if index.size else asked
-        return factor, pull, float(asked @ pull) - 2.0 * float(np.sum(np.log(np.diag(factor))))
+        projected_target = sds * self._reduced[index, 0]
+        solution = np.asarray(dpotrs(factor, projected_target, lower=1)[0]) if index.size else projected_target
+        return factor, solution, float(projected_target @ solution) - 2.0 * float(np.sum(np.log(np.diag(factor))))
 
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
-        """For each candidate the score of ``members`` with it, its equation taken for exact, and its strengths (k,).
+        """For each candidate: the score of ``members`` with it, its number, and its strengths (k,).
 
-        All follow from one factorisation, that of what ``members`` widen; cached.
+        Its equation is taken as exact. All follow from one factorisation for ``members``; cached.
         """
         best = self.posterior(members)
         if best.members not in self._extensions:
@@ -361,17 +376,18 @@ class Evidence:
         return self._extensions[best.members]
 
     def _extended(self, best: Posterior) -> list[tuple[float, int, Array]]:
-        index, sds = self._widened(best.members, best.strengths)
-        factor, pull, _ = self._moved(index, sds)
-        beside = sds[:, None] * self._reduced[index, : self._sds.size + 1]
-        half = solve_triangular(factor, beside, lower=True, check_finite=False) if index.size else beside
-        asked = self._reduced[: self._sds.size + 1, 0] - beside.T @ pull
+        """`extensions` of one set, in groups of candidates with equally many columns."""
+        index, sds = self._columns_and_sds(best.members, best.strengths)
+        factor, solution, _ = self._solve(index, sds)
+        cross_terms = sds[:, None] * self._reduced[index, : self._sds.size + 1]
+        half = solve_triangular(factor, cross_terms, lower=True, check_finite=False) if index.size else cross_terms
+        projected_target = self._reduced[: self._sds.size + 1, 0] - cross_terms.T @ solution
         wide = self.thresholds.strength_sd**2
         found = []
-        for numbers, columns in self._alike:
+        for numbers, columns in self._by_column_count:
             taken = half[:, columns]
             S = self._reduced[columns[:, :, None], columns[:, None, :]] - np.einsum("mgk,mgl->gkl", taken, taken)
-            q = asked[columns]
+            q = projected_target[columns]
             inner = np.eye(columns.shape[1]) + wide * S
             solved = np.linalg.solve(inner, q[:, :, None])[:, :, 0]
             fall = wide * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
@@ -383,24 +399,27 @@ class Evidence:
         return found
 
     @cached_property
-    def _alike(self) -> list[tuple[list[int], Index]]:
+    def _by_column_count(self) -> list[tuple[list[int], Index]]:
         """Candidates with equally many columns (g,), and these columns (g, k)."""
         groups: dict[int, list[int]] = {}
-        for k, one in enumerate(self.given.candidates):
+        for k, one in enumerate(self.linearisation.candidates):
             groups.setdefault(len(one.columns), []).append(k)
-        return [(ks, np.array([self.given.candidates[k].columns for k in ks], dtype=np.intp)) for ks in groups.values()]
+        return [
+            (ks, np.array([self.linearisation.candidates[k].columns for k in ks], dtype=np.intp))
+            for ks in groups.values()
+        ]
 
     def odds_of(self, members: Members) -> float:
-        """-2 log prior odds against the members of a set: of one effect among all, at one of its shapes."""
-        shapes = self.given.shapes
-        return sum(self.odds + 2.0 * math.log(shapes[self.given.candidates[m].name]) for m in members)
+        """-2 log prior odds against a set: for each member one effect among all, at one of its shapes."""
+        shapes = self.linearisation.shapes
+        return sum(self.odds + 2.0 * math.log(shapes[self.linearisation.candidates[m].name]) for m in members)
 
 
 def _factor(matrix: Array) -> Array:
-    """The lower Cholesky factor; where rounding made it indefinite, with as little more on the diagonal as it needs.
+    """The lower Cholesky factor; where rounding made the matrix indefinite, with the least ridge that helps.
 
-    By LAPACK itself: it is asked for thousands of times, of a few dozen rows. Rounding is a share of the largest
-    element, where hardly any noise is left of that much signal.
+    LAPACK is called directly, since this runs thousands of times on a few dozen rows. Rounding is relative to the
+    largest element, which is large where hardly any noise is left beside the signal.
     """
     if not matrix.size:
         return matrix

@@ -1,4 +1,4 @@
-"""What an experiment can show at all: rates, holds, rests, repeats; and what must not be claimed where they lack."""
+"""What an experiment can show: rates, holds, rests, repeats; and what must not be claimed where they are missing."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from smartshoe.signals.masks import runs_of
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
+    """What the load cycles of a set of recordings can show.
 
-    ``present`` holds the words of `Effect.exposed_by` that apply to the load, ``channels`` those that were logged
-    beside it. ``is_judged``: what is held out can be used. ``is_cycled``: a recording that is fitted has more than one
-    load cycle. ``is_unread_at_rest``: it rests without load, and no reading there can be used. ``is_held``: a load is
-    borne without moving, be it for less than slow creep takes to be seen. ``are_rated``: no more than half of the rises
-    are over within too few samples for a rate.
+    ``rates_per_s`` and ``peaks`` are their loading rates and peak loads, in shares of full scale. ``present`` holds the
+    words of `Effect.exposed_by` that apply to the load, ``channels`` those that were logged besides. ``is_judged``:
+    held-out data is usable. ``is_cycled``: a fitted recording has more than one load cycle. ``is_unread_at_rest``: it
+    rests without load, but no reading there is usable. ``is_held``: a load is held still, if only briefly.
+    ``are_rated``: at least half of the rises have enough samples for a rate.
     """
 
     rates_per_s: tuple[float, ...]
@@ -42,23 +42,23 @@ class Excitation:
     are_rated: bool = True
 
     def lacking(self, effect: Effect) -> frozenset[str]:
-        """What would show an effect best and is neither in the loads nor logged beside them."""
+        """What would show an effect best and is neither in the loads nor logged."""
         return effect.exposed_by - self.present - self.channels
 
     def hides(self, effect: Effect) -> bool:
-        """Whether nothing shows an effect but how exactly its law is that of a corner, since it goes with the rate.
+        """Whether an effect is not shown, since it goes with the rate and only one rate and no hold is seen.
 
-        It does where only several rates or holds show it: at one rate without any hold, or none, it is another gain.
+        At one rate it only acts as another gain; what distinguished it would be how sharply its law turns at a corner.
         """
         goes_with_the_rate = bool(effect.exposed_by) and effect.exposed_by <= {"rates", "holds"}
         sees_rates = len(self.rates_per_s) > 1 or (bool(self.rates_per_s) and self.is_held)
         return goes_with_the_rate and not sees_rates
 
     def shows(self, effect: Effect) -> bool:
-        """Whether this data holds any of what shows an effect.
+        """Whether this data shows an effect at all.
 
-        Any loading shows a curve, and a loop or a lag, of whatever kind. What stays, or goes on under load, needs
-        more, be it later load cycles.
+        Any load shows a curve, a loop or a lag. An effect that stays, or goes on under load, needs more, such as later
+        load cycles.
         """
         if self.is_cycled or effect.is_memoryless or not effect.exposed_by:
             return True
@@ -66,16 +66,16 @@ class Excitation:
 
     @property
     def tells_apart(self) -> frozenset[str]:
-        """``present``, but for what recordings of a single load cycle do not show."""
+        """``present`` without the words that a single load cycle does not show."""
         return self.present if self.is_cycled else self.present - LATER_CYCLES
 
     @property
     def goes_with_the_clock(self) -> bool:
-        """Whether peak loads differ, and grow or fall with time in every recording."""
+        """Whether peak loads differ, and only rise or only fall with time in every recording."""
         return "peaks" in self.present and "shuffled_loads" not in self.present
 
     def limits(self) -> list[str]:
-        """A sentence for each thing of which this data says nothing."""
+        """A sentence for each thing that this data does not show."""
         said = []
         if not self.is_judged:
             said.append(
@@ -115,7 +115,7 @@ class Excitation:
 
 
 def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excitation:
-    """What all sessions of which anything is fitted hold together: of the others nothing is learnt."""
+    """The excitation of all sessions of which anything is fitted."""
     is_judged = any(one.judged.any() for one in sessions)
     sessions = [one for one in sessions if not one.held_out.all()]
     each = [list(_rises(session, thresholds)) for session in sessions]
@@ -124,10 +124,10 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     hold_s = max((_longest_read_s(one, _held(one, thresholds)) for one in sessions), default=0.0)
     rested = [(_rested(one, thresholds), one.conditions.step_s) for one in sessions]
     rest_s = max((_longest_read_s(one, mask) for one, (mask, _) in zip(sessions, rested, strict=True)), default=0.0)
-    # What a unit does while nothing presses it shows afterwards, also where nothing is read meanwhile.
-    idle_s = max((n * step_s for mask, step_s in rested for n in _runs(mask)), default=0.0)
-    pauses = [n * step_s for mask, step_s in rested for n in _runs(_within(mask))]
-    # Where a ramp begins and ends is smeared by its window, and found to a sample.
+    # What a unit does at rest shows afterwards, even if nothing is read meanwhile.
+    idle_s = max((n * step_s for mask, step_s in rested for n in _run_lengths(mask)), default=0.0)
+    pauses = [n * step_s for mask, step_s in rested for n in _run_lengths(_inner_runs(mask))]
+    # The ends of a ramp are smeared by the filter's window, and known to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
@@ -162,10 +162,10 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
 
 
 class _Rise(NamedTuple):
-    """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at.
+    """A rise of the load: ``rate`` (full scales per second) over its middle half of ``samples``, ``peak`` reached.
 
-    Where the load's window is longer than two samples, it counts those that it tells apart. ``is_rated``: of so many
-    samples that one more makes no other rate. ``is_cut``: it ends with the recording, before the load fell.
+    Where the filter's window is longer than two samples, ``samples`` counts windows. ``is_rated``: one sample more
+    would not change the rate. ``is_cut``: the recording ends before the load falls.
     """
 
     rate: float
@@ -177,6 +177,7 @@ class _Rise(NamedTuple):
 
 
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
+    """The rises of a session's load that count as load cycles."""
     load, step_s = session.conditions.load, session.conditions.step_s
     lowest, span = float(load.min()), min(1.0, max(float(np.ptp(load)), 1e-9))
     for first, last in rises_of(load, thresholds.cycle * span):
@@ -185,7 +186,7 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
             continue
         part = (load[first : last + 1] - load[first]) / rise
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
-        is_rated = samples * thresholds.same >= 1.0 or session.thinned > 1  # else one sample makes another rate of it
+        is_rated = samples * thresholds.same >= 1.0 or session.thinned > 1  # else a single sample changes the rate
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
         above = float(load[first]) - lowest > thresholds.clear * thresholds.cycle * span
         is_cut = last + 1 == load.size
@@ -193,12 +194,12 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
 
 
 def _windows(session: Session) -> float:
-    """Windows that the load was smoothed by, a sample."""
+    """The number of the filter's windows per sample, at most 1."""
     return min(1.0, session.thinned / LEAST_WINDOW)
 
 
 def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bool:
-    """Whether peak loads of ``each`` recording's rises do not all go with the clock, which begins anew in each."""
+    """Whether in any recording the peak loads do not go with time."""
     trends = []
     for rises in each:
         peaks = np.array([rise.peak for rise in rises if not rise.is_cut])
@@ -209,7 +210,7 @@ def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bo
 
 
 def _still(session: Session, thresholds: Thresholds) -> Mask:
-    """(n,) True where the load does not move, from sample to sample; of a noisy load by its means before and after."""
+    """(n,) True where the load does not move: from sample to sample, or for a noisy load by means before and after."""
     conditions, largest = session.conditions, largest_of_noise(session.conditions.load.size, thresholds)
     if largest * math.sqrt(2.0) * conditions.load_noise <= thresholds.still_per_s * conditions.step_s:
         return np.asarray(np.abs(conditions.rate_per_s) < thresholds.still_per_s)
@@ -222,11 +223,11 @@ def _still(session: Session, thresholds: Thresholds) -> Mask:
     return np.asarray(np.abs(after - before) < thresholds.still_per_s * width * conditions.step_s + noise)
 
 
-def stays(session: Session, thresholds: Thresholds) -> Mask:
-    """(n,) True in stretches of a ``few`` logged samples within which the load moves by no more than counts as none.
+def stays_still(session: Session, thresholds: Thresholds) -> Mask:
+    """(n,) True in runs of a ``few`` logged samples within which the load stays within ``standing``.
 
-    A load that moves by chance at each of its samples, seconds apart, turns slowly here and there and is never held.
-    Where so few last no longer than a load takes to turn its rate says it all.
+    A load that changes at random from sample to sample is slow here and there, but never held. Where a few samples last
+    no longer than a load takes to turn, the rate suffices, and all is True.
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -240,23 +241,23 @@ def stays(session: Session, thresholds: Thresholds) -> Mask:
 
 
 def _turning_s(thresholds: Thresholds) -> float:
-    """What lasts longer is no load that turns."""
+    """The longest time in s that a load takes to turn."""
     return thresholds.clear * thresholds.settled_s
 
 
 def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
     is_borne = ~session.resting & (session.conditions.load > thresholds.cycle)
-    return np.asarray(_still(session, thresholds) & stays(session, thresholds) & is_borne)
+    return np.asarray(_still(session, thresholds) & stays_still(session, thresholds) & is_borne)
 
 
 def _rested(session: Session, thresholds: Thresholds) -> Mask:
-    """(n,) True where no load is borne, and none comes or goes."""
+    """(n,) True where there is no load and it does not move."""
     return np.asarray(_still(session, thresholds) & session.resting)
 
 
-def _within(mask: Mask) -> Mask:
-    """(n,) ``mask`` but for what begins or ends the recording."""
+def _inner_runs(mask: Mask) -> Mask:
+    """(n,) ``mask`` without the runs that begin or end the recording."""
     other = np.flatnonzero(~mask)
     inner = np.zeros_like(mask)
     if other.size:
@@ -264,19 +265,21 @@ def _within(mask: Mask) -> Mask:
     return inner
 
 
-def _runs(mask: Mask) -> list[int]:
+def _run_lengths(mask: Mask) -> list[int]:
+    """The lengths of the runs of True, in samples."""
     first, last = runs_of(mask)
     return [int(n) for n in last - first]
 
 
 def _longest_read_s(session: Session, mask: Mask) -> float:
-    """How long the reading is there within a run of ``mask`` (n,), at most."""
+    """The longest time in s for which the reading is usable within a run of ``mask`` (n,)."""
     total = np.concatenate([[0], np.cumsum(session.usable)])
     first, last = runs_of(mask)
     return float(np.max(total[last] - total[first], initial=0)) * session.conditions.step_s
 
 
 def _distinct(values: Sequence[float], alike: float) -> list[float]:
+    """The values of which each exceeds the one before by more than a share ``alike``."""
     found: list[float] = []
     for value in sorted(values):
         if not found or value > found[-1] * (1.0 + alike):
@@ -285,7 +288,7 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
 
 
 def _most_alike(kinds: Sequence[tuple[float, float]], same: float) -> int:
-    """The most of such pairs that differ from one of them by up to ``same`` in either number."""
+    """The largest number of pairs that agree with one of them within ``same`` in both numbers."""
     if not kinds:
         return 0
     at = np.log(kinds)
@@ -293,12 +296,12 @@ def _most_alike(kinds: Sequence[tuple[float, float]], same: float) -> int:
 
 
 def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: float = 2.0) -> list[float]:
-    """As many rates as differ from one another by more than ``same``, and by more than ramps of so few samples tell.
+    """Rates that differ from one another by more than ``same``, and by more than ramps of so few samples can tell.
 
-    A ramp of n samples, each a window, lasted n +- ``ends``: half a window and half a step are open at either end, two
-    in all where each window is a step of its own. Of ramps that may be of one rate the one that is known to be no
-    faster stands for all, so that a few samples of any rate tie no others together. One stray ramp beside others that
-    are alike, a first one say, makes no second rate.
+    ``rates`` are pairs of a rate and its number of samples. A ramp of n samples lasted n +- ``ends``, since half a
+    window and half a step are open at either end. Of ramps that may share a rate, the one that is surely no faster
+    represents all, so that short ramps do not chain others together. A single ramp beside many equal ones makes no
+    second rate.
     """
     between = []
     for rate, samples in rates:

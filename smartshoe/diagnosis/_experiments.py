@@ -1,4 +1,4 @@
-"""Protocols that tell effects apart, for a machine to run: each shows what the paper's two cannot."""
+"""Protocols that separate effects, for a machine to run: each shows what the paper's two cannot."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from smartshoe.protocol import Protocol, Segment, dynamic_protocol
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
-STEP_S = 0.1  # in which a machine goes from load to load at once; half and twice as long changed no proposal
+STEP_S = 0.1  # the time in which a machine changes the load at once; half and twice as long changed no proposal
 
 
 def long_hold(peak_n: float) -> Protocol:
-    """Five minutes at three quarters of the load, five at none."""
+    """Five minutes at three quarters of the load, five minutes unloaded."""
     return Protocol("long_hold", (*_press(0.75 * peak_n, 300.0, 300.0, peak_n), *_triangle(peak_n, 4.0)))
 
 
 def holds_at_several_loads(peak_n: float) -> Protocol:
-    """A minute and a half at four loads, rests between them."""
+    """A minute and a half at four loads, with rests between them."""
     segments: list[Segment] = []
     for share in (0.25, 1.0, 0.5, 0.75):
         segments += _press(share * peak_n, 90.0, 30.0, peak_n)
@@ -91,7 +91,7 @@ def shuffled_loads(peak_n: float) -> Protocol:
 
 
 def rates(peak_n: float) -> Protocol:
-    """Three triangles at each rate from a sixteenth of the load a second to the whole."""
+    """Three triangles at each rate from a sixteenth of the load per second to all of it."""
     made = dynamic_protocol([share * peak_n for share in (0.0625, 0.125, 0.25, 0.5, 1.0)], peak_n=peak_n, repeats=3)
     return Protocol("rates", made.segments)
 
@@ -105,10 +105,10 @@ EXPERIMENTS: Mapping[str, Callable[[float], Protocol]] = {
 
 
 def paced(protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Protocol:
-    """The same so slowly that a log of a sample every ``sample_time_s`` shows it; itself where that does already.
+    """The protocol, slowed so that a log with a sample every ``sample_time_s`` shows it; unchanged if it does already.
 
-    The log then has a ``few`` samples of each hold, and of a ramp over all the load at the fastest rate, but for loads
-    that are changed at once, and as many of all of it as tell anything; but it lasts no longer than any protocol may.
+    The log has a ``few`` samples of each hold, and of a full ramp at the fastest rate (instant changes excepted), and
+    ``least_samples`` of the whole. It never exceeds the longest allowed protocol.
     """
     least_s, at_n = protocol.duration_s * thresholds.few / thresholds.least_samples, 0.0
     for one in protocol.segments:
@@ -125,7 +125,7 @@ def paced(protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> P
 
 
 def run_on(unit: ExtendedModel, protocol: Protocol, peak_n: float, sample_time_s: float) -> Recording:
-    """What ``unit``, of which ``peak_n`` is the full scale, would read without noise, were the protocol run once."""
+    """The noise-free recording of ``unit``, of full scale ``peak_n``, under one run of the protocol."""
     time_s = np.arange(0.0, protocol.duration_s, sample_time_s)
     load_n = protocol.load_at(time_s)
     reading = unit.reading(Conditions(time_s, load_n / peak_n, sample_time_s))
@@ -135,7 +135,7 @@ def run_on(unit: ExtendedModel, protocol: Protocol, peak_n: float, sample_time_s
 def sessions_on(
     unit: ExtendedModel, protocols: Sequence[Protocol], peak_n: float, sample_time_s: float, thresholds: Thresholds
 ) -> tuple[list[Session], list[int]]:
-    """What `run_on` gives for each protocol, as a diagnosis prepares it, and by how much each was thinned."""
+    """The prepared sessions of `run_on` for each protocol, and the factors by which they were thinned."""
     recordings = [run_on(unit, one, peak_n, sample_time_s) for one in protocols]
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     factors = thinning(recordings, scale, thresholds)
@@ -144,6 +144,7 @@ def sessions_on(
 
 
 def _press(load_n: float, hold_s: float, rest_s: float, peak_n: float) -> list[Segment]:
+    """A rest, a ramp to a load, a hold, a ramp down, and a rest; the rate is the same for every load."""
     ramp_s = 4.0 * load_n / peak_n
     return [
         Segment("rest", 0.0, 3.0),
@@ -155,5 +156,6 @@ def _press(load_n: float, hold_s: float, rest_s: float, peak_n: float) -> list[S
 
 
 def _triangle(load_n: float, rest_s: float, peak_n: float | None = None) -> list[Segment]:
+    """A ramp up, a ramp down, and a rest; the rate is the same for every load of one ``peak_n``."""
     ramp_s = 3.0 * load_n / (peak_n or load_n)
     return [Segment("ramp", load_n, ramp_s), Segment("ramp", 0.0, ramp_s), Segment("rest", 0.0, rest_s)]

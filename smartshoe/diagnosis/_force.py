@@ -1,4 +1,4 @@
-"""The force that a model's inverse gives back, and which effects of a unit's model are undone for it."""
+"""The force that a model's inverse gives, and which effects of a unit's model are undone for it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
-from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._held_out import own_terms_of
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._zero import mean_offset
 from smartshoe.display import percent
@@ -22,26 +22,27 @@ from smartshoe.models.extended import ExtendedModel
 
 @dataclass(frozen=True, slots=True)
 class ForceError:
-    """Root mean square errors in N of the compensated force against the load; NaN where there is nothing."""
+    """Root mean square errors in N of the compensated force against the load; NaN without samples."""
 
     fitted_n: float
     held_out_n: float
 
 
 def force_error(fine: Sequence[Session], model: ExtendedModel) -> ForceError:
-    """Of ``model`` run backwards over what was fitted, and over what is held out."""
-    off = [_off_n(one, model) for one in fine]
+    """The errors of ``model`` inverted, over fitted and over held-out samples."""
+    off = [_force_error_n(one, model) for one in fine]
     return ForceError(_rms(off, [one.fitted for one in fine]), _rms(off, [one.judged for one in fine]))
 
 
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """What a unit is compensated by: ``model``, run backwards, with its ``error``.
+    """The ``model`` that a calibration inverts, and its errors.
 
-    ``model`` is the extended one, but for effects (``passed_over``) whose undoing does more harm than good, or the
-    plain one; ``filter`` undoes it, at the recordings' rate. ``before`` is the plain one's error, ``whole`` that of the
-    extended one with all its effects. ``rejected``: the error of the one that would be ``model``, where it is worse on
-    what is held out. All errors are of the recordings ``fine``, which lack the share ``clipped`` of their samples.
+    ``model`` is the extended one without the effects ``passed_over``, whose inversion does more harm than good, or the
+    plain one (``is_plain``); ``filter`` inverts it at the recordings' rate. ``error`` is its error, ``before`` that of
+    the plain model, ``whole`` that of the extended one with all effects. ``rejected`` is the error of a model that was
+    not taken since it is worse on held-out data. All are over the recordings ``fine``, which lack the share ``clipped``
+    of their samples.
     """
 
     fine: Sequence[Session]
@@ -57,24 +58,23 @@ class Compensation:
 
     @cached_property
     def undone(self) -> ExtendedModel:
-        """What of ``model`` a filter of readings undoes."""
+        """The part of ``model`` that a filter of readings inverts."""
         return self.model.without(*self.filter.not_inverted)
 
     @cached_property
     def zero(self) -> float:
-        """The recordings' mean offset beside what is undone, a share of full scale."""
+        """The recordings' mean offset with only that part simulated, a share of full scale."""
         return mean_offset(self.fine, self.undone)
 
 
 def compensation(
     fine: Sequence[Session], extended: ExtendedModel, plain: ExtendedModel, thresholds: Thresholds
 ) -> Compensation:
-    """The model whose inverse gives back the load of what was fitted best.
+    """The model whose inverse gives the load of fitted data best.
 
-    To undo a lag, a gain that goes by the rate or a curve that hardly rises makes more of the reading's ``noise``, and
-    of all else that is left of it. Where that is so, an effect is undone only if the force is not nearer to the load
-    without. Where the plain model's is nearer all the same, it is the one, and where it is on what is held out. No
-    force is asked of samples that are clipped.
+    Inverting a lag, a rate-dependent gain or a flat curve amplifies ``noise`` and every other residual. Where that
+    happens, effects are dropped one by one while the force improves clearly. The plain model is taken where its force
+    is better all the same, there or on held-out data. Clipped samples do not count, since they give no force.
     """
     count = sum(int(one.usable.sum()) for one in fine)
     fine = [_without_clipped(one, extended, thresholds) for one in fine]
@@ -97,8 +97,8 @@ def compensation(
 
     fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
-    made_of_it = extended.noise / extended.gain * extended.full_scale_load_n
-    while model.parts and least > alike * made_of_it:
+    noise_force_n = extended.noise / extended.gain * extended.full_scale_load_n
+    while model.parts and least > alike * noise_force_n:
         others = [model.without(name) for name in model.names]
         off_n = [force_error(fitted, other).fitted_n for other in others]
         best = min(range(len(off_n)), key=off_n.__getitem__)
@@ -116,7 +116,7 @@ def compensation(
 
 
 def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Session:
-    """``session`` but for samples that ``model`` clips by more than is tolerable: what they read tells no load."""
+    """``session`` without samples that ``model`` clips by more than is tolerable, since their reading gives no load."""
     whole, usable = model.simulate(session.conditions), session.usable
     for part in model.parts:
         if part.effect.clips:
@@ -125,15 +125,15 @@ def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresho
     return replace(session, usable=usable)
 
 
-def clipped_of(found: Compensation) -> list[str]:
-    """What is said of samples of which no force is asked."""
+def limit_clipped(found: Compensation) -> list[str]:
+    """The sentence on clipped samples, for which no force is judged."""
     if not found.clipped:
         return []
     return [f"errors of the force leave out {percent(found.clipped)} of samples, which are clipped and tell no load"]
 
 
-def force_of(found: Compensation) -> list[str]:
-    """What is said of an extended model that gives the load back worse than the plain one does, or than a part does."""
+def limit_force(found: Compensation) -> list[str]:
+    """The sentence on an extended model that gives a worse force than the plain one, or than a part of itself."""
     if found.rejected is not None:
         return [
             "the force that the extended model gives back is worse than the baseline's on held-out data"
@@ -156,14 +156,14 @@ def force_of(found: Compensation) -> list[str]:
     return []
 
 
-def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
-    """What is said of effects that no compensator can take off a stream of readings."""
+def limit_not_undone(model: ExtendedModel, step_s: float) -> list[str]:
+    """Sentences on effects that no compensator can remove from a stream of readings."""
     passed_over = ExtendedCompensator(model, 1.0 / step_s).not_inverted
     return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
-def late_of(found: Compensation) -> list[str]:
-    """What is said of latencies that are undone in part, since the rest would make too much of the noise."""
+def limit_latency_left(found: Compensation) -> list[str]:
+    """Sentences on latencies that are undone in part only, to limit the noise."""
     return [
         f"the calibration leaves {1e3 * left_s:.3g} ms of the {in_words(name)}: undoing all of it would raise"
         " fast noise too much, and where loads are quicker than those judged here the force is that late"
@@ -171,8 +171,8 @@ def late_of(found: Compensation) -> list[str]:
     ]
 
 
-def held_of(found: Compensation, thresholds: Thresholds) -> list[str]:
-    """What is said of drifts that a calibration holds as they are at the end of what was fitted."""
+def limit_drift_held(found: Compensation, thresholds: Thresholds) -> list[str]:
+    """The sentence on drifts that a calibration holds at their value at the end of the fitted data."""
     moved = found.filter.moved_by_the_clock
     held = [part for part in found.model.parts if math.isfinite(part.until_s)]
     held = [part for part in held if abs(moved.get(part.name, 0.0)) > thresholds.standing]
@@ -186,19 +186,24 @@ def held_of(found: Compensation, thresholds: Thresholds) -> list[str]:
     ]
 
 
-def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
-    """What is said where a calibration is clearly farther off on a recording than the errors that are told.
+def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[str]:
+    """The sentence where a calibration is clearly worse on a recording than the stated errors.
 
-    It takes one zero for all recordings, that of what it undoes, and begins each as a unit that bore nothing before;
-    these errors allow each its own, and are of what is held out, whose loads may ask less of it than others do.
+    A calibration has one zero for all recordings, and assumes a rested unit. The stated errors allow each recording its
+    own zero and past, and are of held-out loads, which may be less demanding.
     """
     model, there = found.model, [one for one in found.fine if one.usable.any()]
     scale_n = model.full_scale_load_n
-    off_n = [_rms([_off_by_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there]
+    off_n = [
+        _rms([_error_without_own_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there
+    ]
     worst = max(range(len(there)), key=off_n.__getitem__)
     worst_n, name = off_n[worst], there[worst].recording.name
-    told_n, least_n = _rms([_off_n(there[worst], model)], [there[worst].usable]), thresholds.tolerable * scale_n
-    if worst_n <= thresholds.clear * max(told_n, least_n):
+    stated_n, least_n = (
+        _rms([_force_error_n(there[worst], model)], [there[worst].usable]),
+        thresholds.tolerable * scale_n,
+    )
+    if worst_n <= thresholds.clear * max(stated_n, least_n):
         held_n = found.error.held_out_n
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
             return []
@@ -209,39 +214,42 @@ def as_calibrated(found: Compensation, thresholds: Thresholds) -> list[str]:
     return [
         "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
         f" {name} is off by {worst_n:.2g} N (rms); with its own zero, and what it bore before, allowed for it would be"
-        f" {told_n:.2g} N (zero the load cell and the sensor before each recording, and begin it with a rest)"
+        f" {stated_n:.2g} N (zero the load cell and the sensor before each recording, and begin it with a rest)"
     ]
 
 
-def _off_n(session: Session, model: ExtendedModel) -> Array:
-    """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading.
+def _force_error_n(session: Session, model: ExtendedModel) -> Array:
+    """(n,) compensated force less load in N, with the recording's own offset and past removed from the reading.
 
-    Its past is also what the recordings that it continues did to the unit; their clock goes on, for which a compensator
-    can be told when it starts.
+    The past includes what earlier recordings, which it continues, did to the unit; their clock runs on, and a
+    compensator can be told its start.
     """
     started_s = session.conditions.before.get("time_s", 0.0)
     compensator = _compensator(model, session, started_s)
-    undone = model.without(*compensator.not_inverted)  # what is not taken off is the offset's as far as it is one
+    undone = model.without(*compensator.not_inverted)  # the offset takes the constant part of what is not undone
     read = undone.simulate(session.conditions)
-    _, own = own_of(session, undone, session.reading - read)
+    _, own = own_terms_of(session, undone, session.reading - read)
     if session.conditions.before:
         rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
         own = own + read - undone.simulate(rested)
-    return _off_by_n(session, model, compensator, own)
+    return _error_without_own_n(session, model, compensator, own)
 
 
 def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:
+    """The compensator of ``model`` at a session's rate; ``started_s`` is its clock at the start."""
     return ExtendedCompensator(model, 1.0 / session.conditions.step_s, started_s=started_s)
 
 
-def _off_by_n(session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float) -> Array:
-    """(n,) compensated force less load in N of a reading without what is ``own`` to it, shares of full scale."""
+def _error_without_own_n(
+    session: Session, model: ExtendedModel, compensator: ExtendedCompensator, own: Array | float
+) -> Array:
+    """(n,) compensated force less load in N, for a reading without its ``own`` terms, shares of full scale."""
     force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
     return np.asarray(force_n - session.conditions.load * model.full_scale_load_n)
 
 
 def _rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
-    """Root mean square of ``signals``, (n,) each, where ``seen``; NaN where nothing is."""
+    """Root mean square of ``signals`` (n,) over the samples ``seen``; NaN where there are none."""
     parts = [signal[mask] for signal, mask in zip(signals, seen, strict=True)]
     count = sum(one.size for one in parts)
     return math.sqrt(sum(float(one @ one) for one in parts) / count) if count else math.nan

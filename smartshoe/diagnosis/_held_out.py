@@ -1,7 +1,8 @@
-"""What a model is worth on data that it was not fitted to: errors at the full rate, gains and their intervals.
+"""Errors of a model on data that it was not fitted to, at the full rate; gains and their intervals.
 
-A recording's own offset and initial state are no part of a model. They are estimated on the recording itself, for
-every model alike, from what was fitted of it, or from all of it where nothing was; its state after a long gap likewise.
+A recording's own offset and initial state are not part of a model. They are estimated on the recording itself, for
+every model alike: from its fitted samples, or from all of them where none was fitted; likewise its state after a long
+gap.
 """
 
 from __future__ import annotations
@@ -16,53 +17,53 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances, past_sd
+from smartshoe.diagnosis._sensitivity import nuisance_diagonal, nuisances, past_sd
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import finite_or_none
 
 
-def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
-    """Offset and initial state of a recording under ``model``, and what they add to its reading (n,).
+def own_terms_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
+    """A recording's own terms (2 + k,) under ``model``, and what they add to its reading (n,), shares of full scale.
 
-    (2 + k,): after them its own gains, the changes of its zero and its states after long gaps, if any. A state is
-    bounded by what an arm can hold: its share of the whole load.
+    They are its offset, its initial state, its own gains, the changes of its zero, and its states after long gaps.
+    ``residual`` (n,) is the reading less the simulation. A state is bounded by what the arm can hold under full load.
 
-    Where what is judged comes before all that was fitted, the initial state has the prior that it has in every fit, and
-    noise counts once each correlation time: led back to there, what slow noise does grows by exp(p t).
+    Where held-out samples come before all fitted ones, the initial state has the prior that it has in every fit, and
+    noise counts once per correlation time: extrapolated back, slow noise grows by exp(p t).
     """
-    mask = _told_by(session, model.pole_per_s)
+    mask = _samples_of_own_terms(session, model.pole_per_s)
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
     seen = columns[mask]
-    inner, pulled = seen.T @ seen, seen.T @ residual[mask]
-    held = max(abs(model.relaxing_share * model.gain), 1e-6)
+    inner, right_side = seen.T @ seen, seen.T @ residual[mask]
+    largest_state = max(abs(model.relaxing_share * model.gain), 1e-6)
 
-    def under(variance: float, state_sd: float) -> Array:
-        of_past, of_gap = (variance / sd**2 + 1e-9 for sd in (state_sd, held))
-        prior = a_nuisance_each(session, offset=1e-9, past=of_past, change=variance, gap=of_gap)
-        return np.asarray(np.linalg.solve(inner + prior, pulled), dtype=np.float64)
+    def solved_with(variance: float, state_sd: float) -> Array:
+        of_past, of_gap = (variance / sd**2 + 1e-9 for sd in (state_sd, largest_state))
+        prior = nuisance_diagonal(session, offset=1e-9, past=of_past, change=variance, gap=of_gap)
+        return np.asarray(np.linalg.solve(inner + prior, right_side), dtype=np.float64)
 
-    found = under(float(np.var(residual[mask])) if mask.any() else 0.0, held)
+    found = solved_with(float(np.var(residual[mask])) if mask.any() else 0.0, largest_state)
     if session.judged[: int(np.argmax(mask))].any():
         left = residual - columns @ found
-        found = under(correlated_sd([left], [mask]) ** 2, past_sd(session, model))
+        found = solved_with(effective_noise_sd([left], [mask]) ** 2, past_sd(session, model))
     return found, columns @ found
 
 
-def past_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[float, float]:
-    """What a recording brings along from before it, by all that was fitted of it, and its standard deviation.
+def initial_memory_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[float, float]:
+    """The memory that a recording begins with, from its fitted samples, and its standard deviation.
 
-    With the prior that it has in every fit; noise counts once each correlation time.
+    It has the prior of every fit, and noise counts once per correlation time.
     """
     mask = session.fitted
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
-    left = residual - own_of(session, model, residual)[1]
-    variance = correlated_sd([left], [mask]) ** 2
+    left = residual - own_terms_of(session, model, residual)[1]
+    variance = effective_noise_sd([left], [mask]) ** 2
     known = variance / past_sd(session, model) ** 2
-    prior = a_nuisance_each(session, offset=0.0, past=known, change=variance, gap=variance) + 1e-9 * np.eye(
+    prior = nuisance_diagonal(session, offset=0.0, past=known, change=variance, gap=variance) + 1e-9 * np.eye(
         columns.shape[1]
     )
     seen = columns[mask]
@@ -70,37 +71,40 @@ def past_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[fl
     return float((inverse @ (seen.T @ residual[mask]))[1]), math.sqrt(variance * float(inverse[1, 1]))
 
 
-def _told_by(session: Session, pole_per_s: float) -> Mask:
-    """(n,) samples that tell what is the recording's own: a state after a gap is told before it has faded, or never."""
+def _samples_of_own_terms(session: Session, pole_per_s: float) -> Mask:
+    """(n,) samples from which the own terms are estimated.
+
+    The fitted ones; after a gap also unfitted ones, since the state fades and is seen soon or never.
+    """
     if not session.fitted.any():
         return session.usable
-    told = session.fitted.copy()
+    informative = session.fitted.copy()
     fades = max(1, round(1.0 / (pole_per_s * session.conditions.step_s)))
-    for begins, ends in pairwise((*session.gap_ends, told.size)):
+    for begins, ends in pairwise((*session.gap_ends, informative.size)):
         after = slice(begins, min(begins + fades, ends))
-        if not told[after].any():
-            told[after] = session.usable[after]
-    return told
+        if not informative[after].any():
+            informative[after] = session.usable[after]
+    return informative
 
 
-def changes_in(session: Session, own: Array) -> tuple[Array, Array]:
-    """Its own gains (k,) and the changes of its zero (l,) among what is a recording's own, as `own_of` has it."""
+def gains_and_zero_changes(session: Session, own: Array) -> tuple[Array, Array]:
+    """The own gains (k,) and zero changes (l,) among the own terms of `own_terms_of`."""
     first, last = 2 + len(session.gain_parts), 2 + len(session.gain_parts) + len(session.zero_changes)
     return own[2:first], own[first:last]
 
 
 def residual_of(session: Session, model: ExtendedModel) -> Array:
-    """(n,) reading less simulation less what is the recording's own, in shares of full scale."""
+    """(n,) reading less simulation less own terms, shares of full scale."""
     residual = session.reading - model.simulate(session.conditions)
-    return np.asarray(residual - own_of(session, model, residual)[1])
+    return np.asarray(residual - own_terms_of(session, model, residual)[1])
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Squared errors of the simulated reading by held-out load cycle: ``squares`` and ``counts`` (cycles,).
+    """Squared errors of the simulation by held-out load cycle: ``squares`` and ``counts`` (cycles,).
 
-    ``spread``: standard deviation of the held-out reading about each recording's own mean. Where nothing could be
-    judged there are no cycles, and every figure is NaN.
+    ``spread`` is the standard deviation of the held-out reading about each recording's mean. Without held-out data
+    there are no cycles, and every figure is NaN.
     """
 
     squares: Array
@@ -109,7 +113,7 @@ class Errors:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing could be judged."""
+        """Whether nothing was held out that could be used."""
         return not self.counts.size
 
     @property
@@ -119,17 +123,17 @@ class Errors:
 
     @property
     def fit_percent(self) -> float:
-        """100 (1 - error's norm over the reading's about its mean)."""
+        """100 (1 - norm of the error / norm of the reading about its mean)."""
         return 100.0 * (1.0 - self.rmse / self.spread) if self.spread != 0.0 else 0.0
 
     @property
     def variance_explained_percent(self) -> float:
-        """100 (1 - error's variance over the reading's)."""
+        """100 (1 - variance of the error / variance of the reading)."""
         return 100.0 * (1.0 - (self.rmse / self.spread) ** 2) if self.spread != 0.0 else 0.0
 
 
 def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
-    """The errors over what is held out."""
+    """The errors of ``model`` over the held-out samples."""
     squares: list[Array] = []
     counts: list[Array] = []
     spread, samples = 0.0, 0
@@ -155,8 +159,8 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
 class Gain:
     """Errors before and after in ``unit``, and by how many percent the error falls, with its 95 % interval.
 
-    Of one cycle, of which there is none, the interval is the gain itself. ``is_certain``: that the error falls, or
-    grows, beyond chance and over more than a few cycles; ``is_loss``: that it grows so, by what is material.
+    With one cycle there is no interval, and it is the gain itself. ``is_certain``: the error falls, or grows, beyond
+    chance and over more than a few cycles. ``is_loss``: it grows so, by more than is material.
     """
 
     rmse_before: float
@@ -168,16 +172,16 @@ class Gain:
     is_certain: bool = False
 
     def certain_fall(self, scale: Scale) -> float:
-        """Rms, a share of full scale, of what is done away with for certain; 0 where nothing is."""
-        return _beyond(self.rmse_before, self.rmse_after, scale) if self.is_certain else 0.0
+        """Rms, a share of full scale, that is removed for certain; else 0."""
+        return _rms_excess(self.rmse_before, self.rmse_after, scale) if self.is_certain else 0.0
 
     def growth(self, scale: Scale) -> float:
-        """Rms, a share of full scale, by which the error grows, certain or not; 0 where it does not."""
-        return _beyond(self.rmse_after, self.rmse_before, scale)
+        """Rms, a share of full scale, by which the error grows, certain or not; else 0."""
+        return _rms_excess(self.rmse_after, self.rmse_before, scale)
 
     @property
     def is_rejected(self) -> bool:
-        """Whether the error grows, certain or not: what makes data that it was not fitted to worse is not adopted."""
+        """Whether the error grows at all: a model that is worse on data it was not fitted to is not adopted."""
         return self.rmse_after > self.rmse_before
 
     def to_dict(self) -> dict[str, object]:
@@ -191,17 +195,17 @@ class Gain:
         }
 
 
-def _beyond(more: float, less: float, scale: Scale) -> float:
-    """Rms, a share of full scale, of what ``more`` holds beside ``less``; 0 where it holds no more."""
+def _rms_excess(more: float, less: float, scale: Scale) -> float:
+    """Rms, a share of full scale, of the difference of the squares; 0 where ``more`` is not the larger."""
     square = more**2 - less**2
     return math.sqrt(square) / abs(scale.reading) if square > 0.0 else 0.0
 
 
 def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds) -> Gain:
-    """What ``after`` gains over ``before``: the interval by Student's t and the jackknife over load cycles.
+    """The gain of ``after`` over ``before``, its interval by the jackknife over load cycles and Student's t.
 
-    The jackknife is of the logarithm of the errors' ratio (Efron and Tibshirani 1993), since of few cycles resampling
-    knows too little: of two that are alike by chance it finds a loss beyond chance in one case of four.
+    The jackknife is of the logarithm of the errors' ratio (Efron and Tibshirani 1993). A bootstrap of few cycles is too
+    narrow: two that agree by chance show a certain loss in one case of four.
     """
     unit, span = scale.unit.symbol, abs(scale.reading)
     if before.is_empty:
@@ -222,11 +226,11 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds) ->
 
 
 def _log_ratio(before: Array | float, after: Array | float) -> Array:
-    """Logarithm of a squared error over another; no error counts as the least number there is."""
+    """Logarithm of the ratio of two squared errors, ``after`` over ``before``; zero counts as the smallest float."""
     return np.asarray(np.log(np.maximum(after, float_info.min) / np.maximum(before, float_info.min)))
 
 
 def _percent(log_ratio: Array | float) -> Array:
-    """By how much an error falls whose square changes so; the interval of few cycles may be beyond any number."""
+    """By how many percent an error falls, from the log ratio of its squares; bounded, to stay a finite number."""
     most = -0.5 * math.log(float_info.min)
     return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), most))))

@@ -1,7 +1,7 @@
-"""Which effects the data holds: search over a linearised model and fits of the real one, in turn.
+"""Which effects the data contains: a search over a linearised model and fits of the full model, in alternation.
 
-What is held out for judging is not looked at here. Validation is within the fitted recordings: each is left out in turn
-(or blocks of its cycles, where there is one), and an effect that makes any of them worse is taken out again.
+Held-out data is not used here. An effect is validated within the fitted recordings: each recording is left out in turn
+(of a single recording, blocks of its load cycles), and an effect that does not predict what was left out is removed.
 """
 
 from __future__ import annotations
@@ -11,33 +11,40 @@ from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import (
-    late_beside_usual_arm,
+    latency_with_usual_arm,
     with_a_usual_arm,
-    with_an_arm_that_creeps,
     with_another_pole,
+    with_creeping_arm,
 )
-from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
+from smartshoe.diagnosis._baseline import has_arm_beyond_memory, has_extreme_arm
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._gains_and_zeros import (
     OwnGain,
     ZeroChange,
-    foretells,
     gains_of,
-    with_likelier_gains,
+    predicts_better,
+    with_own_terms,
     zero_changes_of,
 )
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._laws import likelier, with_laws
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
+from smartshoe.diagnosis._laws import likelier_changes, with_laws
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit
 from smartshoe.diagnosis._members import Member, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
-from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._search import BREADTH, additions
-from smartshoe.diagnosis._sensitivity import NO_PRESSURES, is_remembered_by_gas
+from smartshoe.diagnosis._noise import effective_noise_sd
+from smartshoe.diagnosis._search import BREADTH, best_additions
+from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
-from smartshoe.diagnosis._settling import Progress, better_from, better_from_one, law_or_block, settled, simpler
-from smartshoe.diagnosis._state import State, evidence_about, fit_of, searched, state_at
-from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
+from smartshoe.diagnosis._settling import (
+    Progress,
+    law_or_block,
+    settled,
+    simpler,
+    simpler_from,
+    simpler_from_single_effects,
+)
+from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, state_at
+from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import listed
 from smartshoe.models.effects.effect import CoreEffect, Effect
@@ -46,14 +53,21 @@ from smartshoe.models.extended import ExtendedModel
 
 @dataclass(frozen=True, eq=False)
 class Inference:
-    """``baseline`` and ``fit``: the plain and the extended model, each with the likelihood it was fitted by.
+    """The result of an inference: the plain and the extended model, and how sure each effect is.
 
-    ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
-    ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
-    one is idle, and others undo one another without it. ``alone``: the effect that does most by itself, where no
-    member is sure. ``nearest``: where there is no member, an effect that alone follows most of what the baseline
-    leaves, with rms of that and of what it leaves itself, shares of full scale. ``own_gains``: those of the recordings,
-    where they differ by them; ``zero_changes``: when their zeros change.
+    ``baseline`` and ``fit`` are the plain and the extended model, each with the likelihood that it was fitted by.
+    ``members`` are the effects of the extended model, largest first.
+
+    ``screening`` is the fall of the baseline's score for each of the strongest effects alone, and ``likeness`` (k, k)
+    how similar these k effects look (`Evidence.likeness`). ``refused`` are effects that cross-validation removed.
+    ``cancelling_names`` are members that cancel one another, so that none of them is named.
+
+    ``best_single`` is the effect that predicts left-out data best on its own; it is sought only where no member is
+    sure. ``nearest_law`` is sought only where there is no member: a law that alone follows most of what the baseline
+    misses, with the rms of the residual without it and with it, shares of full scale.
+
+    ``own_gains`` are the gains of the recordings where they differ, ``zero_changes`` the moments at which their zeros
+    jump.
     """
 
     baseline: Fit
@@ -63,28 +77,28 @@ class Inference:
     likeness: Array
     refused: tuple[str, ...] = ()
     can_validate: bool = True
-    undone: tuple[str, ...] = ()
-    alone: Effect | None = None
-    nearest: tuple[Effect, float, float] | None = None
+    cancelling_names: tuple[str, ...] = ()
+    best_single: Effect | None = None
+    nearest_law: tuple[Effect, float, float] | None = None
     own_gains: tuple[OwnGain, ...] = ()
     zero_changes: tuple[ZeroChange, ...] = ()
 
 
-def inferred(
+def infer_with_gas_check(
     start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
 ) -> Inference:
-    """`infer`; once more without what a gas remembers where that is most of what relaxes in no gas's pressure.
+    """`infer`, repeated without gas effects where the reading is no pressure but a gas effect relaxes most.
 
-    There it is a free form of what gives way in holds, and no cause: what else leaves no more than a good unit's
-    imperfections do beside it is.
+    Of such a reading a gas effect is only a free form of relaxation in holds, never a cause. The second result counts
+    if its residual is larger by no more than the small imperfections of a good unit (``tolerable``).
     """
     found = infer(start, sessions, thresholds, progress, is_unit)
     units = {one.recording.sensor.unit.quantity for one in sessions}
     relaxing = [one for one in found.members if isinstance(one.effect, CoreEffect) or is_remembered_by_gas(one.effect)]
-    if not (units <= NO_PRESSURES and any(is_remembered_by_gas(one.effect) for one in relaxing[:1])):
+    if not (units <= NON_PRESSURES and any(is_remembered_by_gas(one.effect) for one in relaxing[:1])):
         return found
     progress("going through it again without what a gas remembers")
-    other = infer(start, [replace(one, is_no_gas=True) for one in sessions], thresholds, progress, is_unit)
+    other = infer(start, [replace(one, without_gas_memory=True) for one in sessions], thresholds, progress, is_unit)
     missed = error_of(sessions, other.fit.model) ** 2 - error_of(sessions, found.fit.model) ** 2
     return other if missed <= thresholds.tolerable**2 else found
 
@@ -92,190 +106,222 @@ def inferred(
 def infer(
     start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
 ) -> Inference:
-    """The effects in the fitted part of ``sessions``, beside the baseline ``start``; none where it is no unit's.
+    """The effects in the fitted part of ``sessions``, in addition to the baseline that fits from ``start`` give.
 
-    Where gains of the recordings' own are told, what there is beside these.
+    No effect is sought where ``is_unit`` is False, or where nothing can be left out to validate it. Where the
+    recordings have gains or zeros of their own, the inference is repeated with these as nuisances.
     """
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
-    evidence, best = searched(plain.model, sessions, thresholds)
+    evidence, best = linearised_search(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
     is_valid = can_validate(sessions, thresholds)
     if not (is_unit and is_valid):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
-        return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), is_valid)
-    begun = State(evidence, best, plain)
-    if is_stretched(plain.model):
-        begun = simpler(state_at(late_beside_usual_arm(begun)), begun)
-    state = _sought(begun, progress)
+        return Inference(plain, evaluated(likelihood, plain.model), (), screening, likeness, (), is_valid)
+    initial = State(evidence, best, plain)
+    if has_extreme_arm(plain.model):
+        initial = simpler(state_at(latency_with_usual_arm(initial)), initial)
+    state = _settled_from(initial, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
     with_blocks, lawful = state, with_laws(state, plain.model)
     if lawful is not state:
         state = law_or_block(settled(lawful, progress), state)
-    if (gained := with_likelier_gains(state, sessions)) is not None:
+    if (own_sessions := with_own_terms(state, sessions)) is not None:
         progress("going through it again beside what recordings have of their own")
-        beside = infer(start, gained, thresholds, progress)
-        is_foretold = foretells(beside.fit.model, plain.model, state, sessions, gained)
-        return _beside_own(beside, plain, gained, is_foretold, thresholds)
+        conditional = infer(start, own_sessions, thresholds, progress)
+        is_predicted = predicts_better(conditional.fit.model, plain.model, state, sessions, own_sessions)
+        return _with_own_terms(conditional, plain, own_sessions, is_predicted, thresholds)
     progress("weighing alternatives")
     found = _validated(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
-    if state is not with_blocks and (found.is_stepped_down or replaced & {*found.refused}):
-        # A law that is not the same in each recording is not that law: the block stays.
+    if state is not with_blocks and (found.is_reduced or replaced & {*found.refused}):
+        # A law whose parameters differ between recordings is not that law: the block stays.
         other = _validated(with_blocks, plain, sessions)
-        if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
+        if not other.is_reduced and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
-    found, members = _likeliest(found, plain, sessions, progress)
-    if found.is_stepped_down:
-        found = found.with_nothing_but(plain)
+    found, members = _best_by_single_changes(found, plain, sessions, progress)
+    if found.is_reduced:
+        found = found.reduced_to(plain)
         members = found.members()
-    alone, refused = None, found.refused
-    nameable = [one for one in members if one.name not in found.undone]
+    best_single, refused = None, found.refused
+    nameable = [one for one in members if one.name not in found.cancelling_names]
     if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in nameable):
         progress("trying each of a few effects alone")
-        best_alone = _best_alone(begun, plain, sessions)
-        alone = None if best_alone is None else best_alone[0]
-        if best_alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
-            found = best_alone[1]
+        best_single_fit = _best_single(initial, plain, sessions)
+        best_single = None if best_single_fit is None else best_single_fit[0]
+        if best_single_fit is not None and len(found.fit.model.parts) == len(plain.model.parts):
+            found = best_single_fit[1]
             members, refused = found.members(), tuple(name for name in refused if name not in found.fit.model.names)
-    nearest = None if members else _nearest(begun, plain, sessions)
+    nearest_law = None if members else _nearest_single_law(initial, plain, sessions)
     return Inference(
-        plain, found.fit, members, screening, likeness, refused, undone=found.undone, alone=alone, nearest=nearest
+        plain,
+        found.fit,
+        members,
+        screening,
+        likeness,
+        refused,
+        cancelling_names=found.cancelling_names,
+        best_single=best_single,
+        nearest_law=nearest_law,
     )
 
 
-def _beside_own(
-    beside: Inference, plain: Fit, gained: Sequence[Session], is_foretold: bool, thresholds: Thresholds
+def _with_own_terms(
+    conditional: Inference, plain: Fit, own_sessions: Sequence[Session], is_predicted: bool, thresholds: Thresholds
 ) -> Inference:
-    """What was found ``beside`` gains or zeros of the recordings' own, with these; no effect where none foretells."""
-    if not (beside.own_gains or beside.zero_changes):
-        about = gained, beside.fit.model
-        beside = replace(beside, own_gains=gains_of(*about, thresholds), zero_changes=zero_changes_of(*about))
-    if is_foretold:
-        return replace(beside, baseline=plain)
-    return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)
+    """The inference ``conditional`` on own gains or zeros of the recordings, with their values.
+
+    The effects are dropped where they do not predict recordings better than the plain model (``is_predicted``).
+    """
+    if not (conditional.own_gains or conditional.zero_changes):
+        about = own_sessions, conditional.fit.model
+        conditional = replace(conditional, own_gains=gains_of(*about, thresholds), zero_changes=zero_changes_of(*about))
+    if is_predicted:
+        return replace(conditional, baseline=plain)
+    return replace(
+        conditional,
+        baseline=plain,
+        fit=evaluated(conditional.fit.likelihood, plain.model),
+        members=(),
+        best_single=None,
+    )
 
 
-def _sought(begun: State, progress: Progress) -> State:
-    """What settles from ``begun``, also with other arms of the baseline where it came to one that effects had bent."""
-    state = settled(begun, progress)
-    if is_beyond_memory(state.fit.model, begun.thresholds):
+def _settled_from(initial: State, progress: Progress) -> State:
+    """The state that `settled` reaches from ``initial``, tried also from other relaxing arms of the baseline.
+
+    An effect that is missing from the model bends the baseline's arm, and a bent arm hides that effect.
+    """
+    state = settled(initial, progress)
+    if has_arm_beyond_memory(state.fit.model, initial.thresholds):
         progress("beginning anew from arms as units have")
-        state = better_from(with_a_usual_arm(begun), state, progress)
+        state = simpler_from(with_a_usual_arm(initial), state, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        state = better_from(with_another_pole(state), state, progress)
+        state = simpler_from(with_another_pole(state), state, progress)
     if state.fit.model.relaxing_share < 0.0:
-        state = better_from(with_an_arm_that_creeps(state), state, progress)
-    return better_from_one(begun, state, progress)
+        state = simpler_from(with_creeping_arm(state), state, progress)
+    return simpler_from_single_effects(initial, state, progress)
 
 
 @dataclass(frozen=True, eq=False)
 class _Validated:
-    """The effects of a state that survive cross-validation: their set and ``fit``; those ``refused`` do not.
+    """The effects of a state that survive cross-validation: the set ``best``, its ``fit``, and the ``refused`` ones.
 
-    ``is_stepped_down``: the whole extension failed, and effects were dropped one by one until the rest stood. Such a
-    set was selected on what is left out, so that this validates it no longer: it shows where to look for likelier
-    laws, and is no answer.
+    ``is_reduced``: the whole extension failed, and effects were removed one by one until the rest passed. The left-out
+    data has then selected the set and can no longer validate it: it suggests where to look, but is no answer.
     """
 
     evidence: Evidence
     best: Posterior
     fit: Fit
     refused: tuple[str, ...]
-    undone: tuple[str, ...]
-    is_stepped_down: bool
+    cancelling_names: tuple[str, ...]
+    is_reduced: bool
 
-    def with_nothing_but(self, plain: Fit) -> _Validated:
-        """What the plain model itself has, two clocks, which were told before any model."""
-        candidates, own = self.evidence.given.candidates, plain.model.names
+    def reduced_to(self, plain: Fit) -> _Validated:
+        """Only the effects that the plain model has itself: clocks, which were found before any model."""
+        candidates, own = self.evidence.linearisation.candidates, plain.model.names
         best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
         refused = (*self.refused, *(name for name in self.fit.model.names if name not in own))
-        return replace(self, fit=weighed(self.fit.likelihood, plain.model), best=best, refused=refused, undone=())
+        return replace(
+            self, fit=evaluated(self.fit.likelihood, plain.model), best=best, refused=refused, cancelling_names=()
+        )
 
     def members(self) -> tuple[Member, ...]:
-        """Each effect weighed against its alternatives."""
+        """Each effect, weighed against its alternatives."""
         return members_of(self.evidence, self.best, self.fit)
 
 
 def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Validated:
-    """What of a state's effects predicts what is left out, fitted at last."""
-    given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
-    likelihood, most = state.likelihood(), error_of(sessions, plain.model)
+    """The effects of ``state`` that predict what is left out, refitted to all fitted data.
+
+    In this order it removes effects that differ between recordings, the idle one of several that cancel one another,
+    effects that act mainly beyond the fitted loads, and, while the extension as a whole fails, the effect without which
+    the left-out error is smallest.
+    """
+    linearisation, evidence, best, extended = state.linearisation, state.evidence, state.best, state.fit
+    likelihood, plain_error = state.likelihood(), error_of(sessions, plain.model)
     left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
-    whole = fit_of(state, best, likelihood)
-    extended = left_out.following(whole)
-    refused = [name for name in whole.model.names if name not in extended.model.names]
-    best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name not in refused))
-    undone = cancelling(sessions, extended.model, state.thresholds)
-    if undone:
-        less = {name: fit(likelihood, extended.model.without(name)) for name in undone}
-        idle = min(undone, key=lambda name: less[name].cost)
-        if error_of(sessions, less[idle].model) ** 2 > state.thresholds.clear * error_of(sessions, extended.model) ** 2:
-            undone = []  # each is needed, though they pull in opposite ways
-        elif not cancelling(sessions, less[idle].model, state.thresholds):
-            undone = []
+    fitted = fit_of_set(state, best, likelihood)
+    extended = left_out.consistent(fitted)
+    refused = [name for name in fitted.model.names if name not in extended.model.names]
+    best = evidence.posterior(tuple(m for m in best.members if linearisation.candidates[m].name not in refused))
+    cancelling_names = cancelling_effects(sessions, extended.model, state.thresholds)
+    if cancelling_names:
+        without = {name: fit(likelihood, extended.model.without(name)) for name in cancelling_names}
+        idle = min(cancelling_names, key=lambda name: without[name].cost)
+        if (
+            error_of(sessions, without[idle].model) ** 2
+            > state.thresholds.clear * error_of(sessions, extended.model) ** 2
+        ):
+            cancelling_names = []  # each is needed, although they cancel in part
+        elif not cancelling_effects(sessions, without[idle].model, state.thresholds):
+            cancelling_names = []
             refused.append(idle)
-            extended = less[idle]
-    while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
+            extended = without[idle]
+    while (beyond := extrapolating_effect(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         extended = fit(likelihood, extended.model.without(beyond))
     extra = [name for name in extended.model.names if name not in plain.model.names]
-    following = len(extra)
-    while extra and (error_of(sessions, extended.model) >= most or not left_out.stands(extended.model, plain.model)):
-        less = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
-        worst = min(extra, key=lambda name: float(left_out.errors(less[name].model).sum()))
+    extra_count = len(extra)
+    while extra and (
+        error_of(sessions, extended.model) >= plain_error or not left_out.is_validated(extended.model, plain.model)
+    ):
+        without = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
+        worst = min(extra, key=lambda name: float(left_out.errors(without[name].model).sum()))
         refused.append(worst)
         extra.remove(worst)
-        extended = less[worst]
-    extended = extended if extra else weighed(likelihood, plain.model)  # the plain fit knows another noise
-    kept = extended.model.names
-    if refused and kept:
+        extended = without[worst]
+    extended = extended if extra else evaluated(likelihood, plain.model)  # the plain fit has its own noise level
+    kept_names = extended.model.names
+    if refused and kept_names:
         evidence, best = evidence_about(extended.model, evidence)
     else:
-        best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
-    left = tuple(name for name in undone if name in kept)
-    is_stepped_down = len(extra) < following
-    return _Validated(evidence, best, extended, tuple(refused), left, is_stepped_down)
+        best = evidence.posterior(tuple(m for m in best.members if linearisation.candidates[m].name in kept_names))
+    cancelling_left = tuple(name for name in cancelling_names if name in kept_names)
+    is_reduced = len(extra) < extra_count
+    return _Validated(evidence, best, extended, tuple(refused), cancelling_left, is_reduced)
 
 
-def _likeliest(
+def _best_by_single_changes(
     found: _Validated, plain: Fit, sessions: Sequence[Session], progress: Progress
 ) -> tuple[_Validated, tuple[Member, ...]]:
-    """The likeliest set that changes of one member or law lead to from ``found``, and its members, weighed."""
+    """The best set that changes of one member or one law reach from ``found``, and its members."""
     while True:
         found, members = _without_redundant(found, plain)
-        told = [one for one in members if one.name not in plain.model.names]  # two clocks were told before any model
-        for better in likelier(found.fit, found.evidence, told):
+        removable = [one for one in members if one.name not in plain.model.names]  # clocks were found before any model
+        for better in likelier_changes(found.fit, found.evidence, removable):
             progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
             other = _validated(better, plain, sessions)
             if _is_likelier(other, found):
                 found = other
                 break
-        else:  # no change is likelier, or leads to a set that is
+        else:  # no single change gives a more probable set
             return found, members
 
 
 def _is_likelier(other: _Validated, found: _Validated) -> bool:
-    """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``.
+    """Whether ``other`` has more evidence, each about its own fit, with the noise of ``found``.
 
-    Not for one that needs an arm as no wall has, where ``found`` does without: it follows what an effect does.
+    It must not need an arm that no wall has where ``found`` does without: such an arm takes the place of an effect.
     """
-    if is_stretched(other.fit.model) and not is_stretched(found.fit.model):
+    if has_extreme_arm(other.fit.model) and not has_extreme_arm(found.fit.model):
         return False
     new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
 
 
 def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple[Member, ...]]:
-    """``found`` without effects that another of their family makes immaterial, and its members, weighed.
+    """``found`` without effects that another effect of their family makes immaterial, and its members.
 
-    A lag and a delay beside it, of which neither is needed where the other is, are each too small for a name.
+    For example a lag and a delay, of which either suffices: side by side each is too small to be named.
     """
     members = found.members()
-    while (less := _redundant(members, plain, found.evidence.thresholds)) is not None:
-        refitted = fit(found.fit.likelihood, less.without.model)
+    while (redundant := _redundant(members, plain, found.evidence.thresholds)) is not None:
+        refitted = fit(found.fit.likelihood, redundant.without.model)
         evidence, best = evidence_about(refitted.model, found.evidence)
         found = replace(found, fit=refitted, evidence=evidence, best=best)
         members = found.members()
@@ -283,7 +329,7 @@ def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple
 
 
 def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) -> Member | None:
-    """The smallest effect, where it is immaterial beside another of its family, and none that was there before."""
+    """The smallest immaterial effect that shares its family with another one and is not in the plain model."""
     families = [one.effect.kind for one in members]
     twice = [
         one
@@ -295,68 +341,71 @@ def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) ->
     return min(twice, key=lambda one: one.size, default=None)
 
 
-def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:
-    """Of the few likeliest effects the one by which alone what is left out is foreseen best, where any stands.
+def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:
+    """Of the most probable effects the one that alone predicts left-out data best, if any passes validation.
 
-    Where several stand in for one another none is sure; which of them does most by itself does not hang on the others.
-    It must do away with more than small imperfections of a good unit add up to.
+    Where several effects can replace one another none is sure, but which of them does most alone does not depend on the
+    others. It must remove more than the small imperfections of a good unit (``tolerable``).
     """
-    before, thresholds = error_of(sessions, plain.model), begun.thresholds
+    before, thresholds = error_of(sessions, plain.model), initial.thresholds
     if before <= thresholds.tolerable:
         return None
-    left_out = LeftOut(sessions, begun.evidence.noise_sd, plain.model, thresholds)
-    likelihood, standing = begun.likelihood(), []
-    nothing = begun.evidence.posterior(begun.start)
-    for k in additions(begun.evidence, begun.start, BREADTH):
-        best = begun.evidence.posterior((*begun.start, k))
+    left_out = LeftOut(sessions, initial.evidence.noise_sd, plain.model, thresholds)
+    likelihood, standing = initial.likelihood(), []
+    nothing = initial.evidence.posterior(initial.fitted_members)
+    for k in best_additions(initial.evidence, initial.fitted_members, BREADTH):
+        best = initial.evidence.posterior((*initial.fitted_members, k))
         if best.score >= nothing.score:
             continue
-        one = State(begun.evidence, best, fit_of(begun, best, likelihood))
+        one = State(initial.evidence, best, fit_of_set(initial, best, likelihood))
         validated = _validated(one, plain, sessions)
         removed = before**2 - error_of(sessions, validated.fit.model) ** 2
-        if not validated.is_stepped_down and removed > thresholds.tolerable**2:
-            standing.append((begun.given.candidates[k].effect, validated))
+        if not validated.is_reduced and removed > thresholds.tolerable**2:
+            standing.append((initial.linearisation.candidates[k].effect, validated))
     return min(standing, key=lambda one: float(left_out.errors(one[1].fit.model).sum()), default=None)
 
 
-def _nearest(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, float, float] | None:
-    """The law that alone leaves least of what is more than tolerable, and what is left without and with it.
+def _nearest_single_law(initial: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, float, float] | None:
+    """The law that alone leaves the smallest residual, with the rms without and with it, shares of full scale.
 
-    None where that is not clearly less. It has no more evidence than small imperfections of all kinds together have.
+    None unless the residual exceeds ``tolerable`` and the law reduces its power clearly (``clear``). Such a law has no
+    more evidence than many small imperfections together.
     """
-    before, thresholds = error_of(sessions, plain.model), begun.thresholds
+    before, thresholds = error_of(sessions, plain.model), initial.thresholds
     if before <= thresholds.tolerable:
         return None
-    likelihood, left = begun.likelihood(), []
-    for k in additions(begun.evidence, begun.start, 2 * BREADTH):
-        one = begun.given.candidates[k]
+    likelihood, remaining = initial.likelihood(), []
+    for k in best_additions(initial.evidence, initial.fitted_members, 2 * BREADTH):
+        one = initial.linearisation.candidates[k]
         if not one.effect.is_flexible:
-            fitted = fit_of(begun, begun.evidence.posterior((*begun.start, k)), likelihood, FEW_STEPS)
-            left.append((error_of(sessions, fitted.model), one.effect))
-    least, effect = min(left, key=lambda pair: pair[0], default=(before, None))
+            fitted = fit_of_set(
+                initial, initial.evidence.posterior((*initial.fitted_members, k)), likelihood, FEW_STEPS
+            )
+            remaining.append((error_of(sessions, fitted.model), one.effect))
+    least, effect = min(remaining, key=lambda pair: pair[0], default=(before, None))
     return (effect, before, least) if effect is not None and thresholds.clear * least**2 <= before**2 else None
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
-    """The best predictor of the form of ``start``: output error, each correlation time of what is left counted once."""
+    """The best predictor of the form of ``start``: output error, with noise counted once per correlation time."""
     residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
-    return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start)
+    return fit(Likelihood(sessions, effective_noise_sd(residuals, kept), start, thresholds), start)
 
 
-def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
-    """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
+def independent_count(sessions: Sequence[Session], thresholds: Thresholds) -> int:
+    """The number of units that can be left out: fitted recordings, or load cycles of a single one."""
     fitted = fitted_of(sessions)
     return len(fitted) if len(fitted) > 1 else load_cycles(fitted, thresholds)
 
 
 def can_validate(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
-    """Whether anything can be left out and predicted from the rest: within one load cycle nothing validates."""
-    return independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
+    """Whether anything can be left out and predicted from the rest; within one load cycle nothing can."""
+    return independent_count(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
 
 
 def _screening(evidence: Evidence) -> tuple[tuple[tuple[str, float], ...], Array]:
-    """What each of the strongest effects alone takes off the baseline's score, and how alike they look (k, k)."""
+    """By how much each of the strongest effects alone lowers the baseline's score, and their likeness (k, k)."""
     nothing = evidence.posterior(()).score
-    falls = {k: nothing - evidence.posterior((k,)).score for k in additions(evidence, (), 2 * BREADTH)}
+    falls = {k: nothing - evidence.posterior((k,)).score for k in best_additions(evidence, (), 2 * BREADTH)}
     order = sorted(falls, key=lambda k: -falls[k])
-    return tuple((evidence.given.candidates[k].name, falls[k]) for k in order), evidence.likeness(order)
+    return tuple((evidence.linearisation.candidates[k].name, falls[k]) for k in order), evidence.likeness(order)

@@ -1,12 +1,12 @@
-"""What a model leaves over: how much of it is structure and how much noise, judged without any model of the structure.
+"""Tests of lack of fit: how much of a residual is structure and how much noise, without any model of the structure.
 
-Two tests, since an unknown effect shows in either:
+There are two, since an unknown effect shows in either:
 
-*repeating*: the products of a cycle's residual with its repeats' (cycles of one rate and height). Noise of different
-cycles is independent whatever its colour, so that their mean is the variance of what repeats.
+*repeating*: products of a load cycle's residual with those of its repeats (cycles of equal rate and height). Noise of
+different cycles is independent whatever its colour, so that the mean product is the variance that repeats.
 
-*slow*: means over blocks of a few seconds against what noise of the residual's own fast part would give. A step in
-gain, a slow walk, a random telegraph repeat with no cycle, but they do not average out within a block either.
+*slow*: means over blocks of a few seconds, compared with what noise of the residual's fast part would give. A step in
+gain, a slow walk or a random telegraph does not repeat with a cycle, but does not average out within a block either.
 """
 
 from __future__ import annotations
@@ -25,18 +25,17 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.noise import NORMAL_QUARTILE, autocovariance
 
-# Resolutions: half and twice of each changed no name in two cases.
+# Resolutions. Half and twice of each changed no name in two cases.
 COLOURS = 5  # time constants of the noise's coloured part
-PLACES = 64  # of a cycle, when repeats are laid over each other
+PLACES = 64  # samples of a cycle at which repeats are compared
 
 
 @dataclass(frozen=True, slots=True)
 class LackOfFit:
-    """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
+    """The result of a test: ``rms`` of the structure, a share of full scale (0 where its variance is negative).
 
-    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks; ``variance_sd`` the standard
-    deviation of its variance under noise alone. ``significant``: noise that is known by so many hardly reaches it
-    (Student's t).
+    ``z`` is its score against noise, from ``pairs`` of repeats or as many blocks, and ``variance_sd`` the standard
+    deviation of its variance under noise. ``significant``: the score exceeds Student's t at the false-alarm level.
     """
 
     rms: float
@@ -47,25 +46,27 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
+        """Whether noise hardly reaches this score, by Student's t."""
         return self.pairs > 1 and self.z > self._largest_of_noise
 
-    def would_show(self, rms: float) -> bool:
-        """Whether structure of this ``rms`` would be significant: where it would not, none is no proof of noise."""
+    def would_detect(self, rms: float) -> bool:
+        """Whether structure of this ``rms`` would be significant; if not, finding none does not prove noise."""
         return self.pairs > 1 and rms**2 > self._largest_of_noise * self.variance_sd
 
     @property
     def _largest_of_noise(self) -> float:
+        """The score that noise reaches with the probability of a false alarm."""
         return -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
 
 
-def repeating(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
-    """Structure that repeats from cycle to cycle: its power in each kind of cycle, over the record."""
+def repeating_structure(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
+    """Structure that repeats from load cycle to load cycle: its power in each kind of cycle, over the record."""
     power = variance = 0.0
     pairs = 0
     for rows, share in repeats(sessions, residuals, thresholds.cycle):
         count, places = rows.shape
         pair_count = count * (count - 1) // 2
-        # Over all pairs, products add up to the sum's square less the squares.
+        # The sum of products over all pairs is half of the squared sum less the sum of squares.
         mean = (float(np.sum(rows.sum(axis=0) ** 2)) - float(np.sum(rows**2))) / (2 * pair_count * places)
         # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
         auto = autocovariance(rows - rows.mean(axis=0)) / (places * (count - 1))
@@ -81,12 +82,11 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
 
 
 def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: float) -> list[tuple[Array, float]]:
-    """The residual over each kind of load cycle that comes back, (repeats, places), and over the rest after it.
+    """For each kind of load cycle that repeats: residuals (repeats, places), and the share of samples in such cycles.
 
-    `PLACES` while the unit is loaded, and as many a second at rest, for as long as it rests after each of the kind.
-    Cycles of a kind differ by a share ``alike`` at most, in height, duration and course: random loads of one height
-    repeat nothing. And the share of all samples that are within cycles of the kind: elsewhere nothing tells what
-    repeats.
+    There are `PLACES` samples while the unit is loaded, and equally dense ones over the rest that follows each of them.
+    Cycles of a kind differ by a share ``alike`` at most in height, duration and course: random loads of equal height
+    repeat nothing.
     """
     found: list[_LoadCycle] = []
     total = 0
@@ -106,7 +106,7 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
             loaded = int(np.searchsorted(usable, last + 1 - first))
             if loaded < 0.9 * (last + 1 - first):
                 continue
-            # A reading at its rail is as wrong each time: of what is masked nothing is left over.
+            # Masked samples are left out: a reading at its rail is wrong in the same way each time.
             there, step_s = first + usable, session.conditions.step_s
             course = np.interp(np.linspace(0, last - first, PLACES), usable[:loaded], load[there[:loaded]])
             rest_s = (stop - 1 - last) * step_s if usable.size - loaded >= 0.9 * (stop - 1 - last) else 0.0
@@ -124,7 +124,7 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
 
 
 def _laid_over(kind: Sequence[_LoadCycle], total: int) -> tuple[Array, float]:
-    """The rows of cycles of a kind, and their share of ``total`` samples."""
+    """The residuals (repeats, places) of cycles of a kind, and their share of ``total`` samples."""
     rest_s = min(one.rest_s for one in kind)
     at_rest = round(PLACES * rest_s / kind[0].duration_s)
     share = sum(one.size + rest_s / one.step_s for one in kind) / total
@@ -132,9 +132,9 @@ def _laid_over(kind: Sequence[_LoadCycle], total: int) -> tuple[Array, float]:
 
 
 class _LoadCycle(NamedTuple):
-    """``peak`` load and ``course`` (PLACES,) of the ``size`` samples that are clear of rest; ``rest_s`` that follows.
+    """A load cycle: ``peak`` load and ``course`` (PLACES,) of the ``size`` loaded samples; ``rest_s`` that follows.
 
-    ``residual`` (n,) at ``time_s`` (n,) from where it is clear of rest.
+    ``residual`` (n,) is given at ``time_s`` (n,) from the first loaded sample.
     """
 
     peak: float
@@ -147,16 +147,17 @@ class _LoadCycle(NamedTuple):
 
     @property
     def duration_s(self) -> float:
+        """The time in s under load."""
         return (self.size - 1) * self.step_s
 
     def row(self, rest_s: float, at_rest: int) -> Array:
-        """The residual at `PLACES` while loaded and ``at_rest`` more over ``rest_s``."""
+        """The residual at `PLACES` while loaded, and at ``at_rest`` more places over ``rest_s``."""
         loaded_s = np.linspace(0.0, self.duration_s, PLACES)
         at_rest_s = self.duration_s + np.linspace(0.0, rest_s, at_rest + 1)[1:]
         return np.asarray(np.interp(np.concatenate([loaded_s, at_rest_s]), self.time_s, self.residual))
 
     def is_like(self, other: _LoadCycle, alike: float) -> bool:
-        """Whether it differs from another by a share ``alike`` at most."""
+        """Whether it differs from another cycle by a share ``alike`` at most."""
         if abs(self.peak - other.peak) > alike * abs(other.peak):
             return False
         if abs(self.duration_s - other.duration_s) > alike * abs(other.duration_s):
@@ -164,8 +165,8 @@ class _LoadCycle(NamedTuple):
         return float(np.std(self.course - other.course)) <= alike * float(np.std(other.course))
 
 
-def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
-    """Structure in the means of blocks of ``lasting_s``, beyond what the noise of the faster part would leave there."""
+def slow_structure(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
+    """Structure in the means of blocks of ``lasting_s``, beyond what noise of the faster part would leave there."""
     excess: list[float] = []
     spread = 0.0
     for session, residual in zip(sessions, residuals, strict=True):
@@ -181,7 +182,7 @@ def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Th
         means = rows.mean(axis=1)
         expected = _mean_variance(rows - means[:, None], step_s, thresholds) * _loudness(rows, thresholds.clear)
         excess += list(means**2 - expected)
-        # The blocks' own scatter, and that the noise is known from them to some percent only.
+        # The scatter of the blocks, and the uncertainty of the noise estimated from them.
         spread += 2.0 * float(expected @ expected) + (thresholds.same * float(expected.sum())) ** 2
     if not excess:
         return LackOfFit(0.0, 0.0, 0, thresholds)
@@ -190,36 +191,37 @@ def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Th
     return LackOfFit(float(np.sqrt(max(mean, 0.0))), mean / sd, len(excess), thresholds, sd)
 
 
-def _quiet(rows: Array) -> Mask:
-    """(blocks,) the nine tenths with the least power: a block with a step in it tells nothing of noise."""
+def _quiet_blocks(rows: Array) -> Mask:
+    """(blocks,) True for the nine tenths with the least power: a block with a step in it does not show the noise."""
     power = np.sum((rows - rows.mean(axis=1, keepdims=True)) ** 2, axis=1)
     return np.asarray(power <= np.quantile(power, 0.9))
 
 
 def _loudness(rows: Array, clear: float) -> Array:
-    """(blocks,) noise power of each block over that of the quiet ones, by differences of neighbours.
+    """(blocks,) noise power of each block relative to that of the quiet ones, by differences of neighbours.
 
-    Noise that grows with load or slope is no structure; and structure hardly shows from one sample to the next.
+    Noise that grows with load or slope is not structure, and structure hardly shows from sample to sample.
     """
     fast = np.abs(np.diff(rows, axis=1))
-    # One jump in a block is no loud noise: as much as is clear of the standard deviation, by the median.
+    # A single jump in a block is not loud noise: differences are clipped at a multiple of their standard deviation,
+    # estimated by the median.
     fast = np.mean(np.minimum(fast, clear / NORMAL_QUARTILE * np.median(fast, axis=1, keepdims=True)) ** 2, axis=1)
-    usual = float(fast[_quiet(rows)].mean())
+    usual = float(fast[_quiet_blocks(rows)].mean())
     return np.asarray(fast / usual) if usual > 0.0 else np.ones(fast.size)
 
 
 def _mean_variance(centred: Array, step_s: float, thresholds: Thresholds) -> float:
-    """Variance of a block's mean under noise, white and first-order, that fits the ``centred`` (blocks, width).
+    """Variance of a block's mean under white and first-order noise fitted to the ``centred`` blocks (blocks, width).
 
-    Taking a block's mean out changes every covariance; so the fit is to covariances that were changed in the same way.
+    Removing a block's mean changes every covariance, so that the fit is to covariances changed in the same way.
     """
     width = centred.shape[1]
     lags = np.arange(width // 2)
-    rows = centred[_quiet(centred)]
+    rows = centred[_quiet_blocks(centred)]
     found = autocovariance(rows)[lags] / (rows.shape[0] * (width - lags))
     white, of_mean = _centred(np.eye(1, width)[0])
     best: tuple[float, float] | None = None
-    # A few of the slowest go into a block: what is slower counts as structure.
+    # A block holds a few of the slowest time constants; what is slower counts as structure.
     for tau_s in np.geomspace(thresholds.echo_s, thresholds.lasting_s / thresholds.few, COLOURS):
         coloured, slow_of_mean = _centred(np.exp(-np.arange(width) * (step_s / tau_s)))
         (w, c), off = nnls(np.column_stack([white, coloured]), found)
@@ -229,10 +231,10 @@ def _mean_variance(centred: Array, step_s: float, thresholds: Thresholds) -> flo
 
 
 def _centred(covariance: Array) -> tuple[Array, float]:
-    """Of noise with the ``covariance`` (w,) at each lag: that of a block of w less its mean, and the mean's variance.
+    """The covariance (w // 2,) of noise less its mean over a block of w, and the variance of that mean.
 
-    The former (w // 2,), averaged over the block's places: each place's with the mean is taken out twice, and the
-    mean's variance put back.
+    ``covariance`` (w,) is that of the noise at each lag. The result is averaged over the block: the covariance with the
+    mean is subtracted twice, and the variance of the mean added.
     """
     width = covariance.size
     lags = np.arange(width // 2)

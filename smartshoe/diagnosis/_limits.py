@@ -1,4 +1,8 @@
-"""What limits a diagnosis, in sentences: causes that are withheld, and what no model foresees."""
+"""The sentences that limit a diagnosis: why an effect is no cause, and what no model can predict.
+
+A function ``reason_...`` says why one name is no cause, a function ``limit_...`` what holds for the diagnosis as a
+whole.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,16 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of
-from smartshoe.diagnosis._baseline import RATE, WALL_RATIOS, is_stretched
+from smartshoe.diagnosis._baseline import RATE, WALL_RATIOS, has_extreme_arm
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of, time_of
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._sensitivity import NO_PRESSURES, is_remembered_by_gas
+from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of
-from smartshoe.diagnosis._validation import apart
+from smartshoe.diagnosis._validation import rms_difference
 from smartshoe.diagnosis._zero import OwnZeros, Zero
 from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds
@@ -29,20 +33,21 @@ from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import Unit
 
 ONE_CYCLE = "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
-SAID = 4  # of many of a kind, as changes of a gain, that are told one by one
+SAID = 4  # of many changes of a gain, or other such items, how many are listed
 
 
-def parted_clocks(
-    told: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
+def limit_clocks_disagree(
+    clocks: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
 ) -> str | None:
-    """What is said of a lag between clocks that the fit sees otherwise than the edges of load and reading did.
+    """The sentence where the fit's lag between clocks differs from the one that the edges showed; None otherwise.
 
-    By all that makes the model late in the middle of what is fitted.
+    The lag is that of all that makes the model late, in the middle of the fitted time. ``clocks`` are the effects, with
+    values, by the edges.
     """
-    if not {one.name for one, _ in told} & {*model.names}:
+    if not {one.name for one, _ in clocks} & {*model.names}:
         return None
     middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in fitted_of(sessions)]))
-    lag_s = sum(one.late_s(values, middle_s) for one, values in told)
+    lag_s = sum(one.late_s(values, middle_s) for one, values in clocks)
     fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
         return None
@@ -53,21 +58,26 @@ def parted_clocks(
 
 
 def _late(lag_s: float) -> str:
+    """A lag in words."""
     return f"{abs(lag_s):.3g} s {'late' if lag_s >= 0.0 else 'early'}"
 
 
 def _unnamed(name: Name, but: str) -> str:
-    """What is said of a name that is no cause."""
+    """The sentence on a name that is no cause, with the reason ``but``."""
     return f"{in_words(name.effect.name)} fits, but {but}, so that it is not named"
 
 
-def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> str | None:
-    """What is said of an effect that follows best where it is of another kind, or is the wall's own arm.
+def reason_of_another_kind(name: Name, model: ExtendedModel, thresholds: Thresholds) -> str | None:
+    """Why a name is none: its effect acts as another kind would, or as the wall's own arm.
 
-    A block of what no law does is one where it differs from a law by more than laws do.
+    A flexible block of a behaviour without a law is one where it departs from every law by more than laws do.
     """
     part = model.part(name.member.name)
-    if part.effect.why_unnamed and name.by is None and part.effect.departs_by(part.values) > thresholds.law_departure:
+    if (
+        part.effect.why_unnamed
+        and name.law_in_place is None
+        and part.effect.departs_by(part.values) > thresholds.law_departure
+    ):
         return f"the reading {part.effect.why_unnamed}, which no effect of the catalogue does, so that it is not named"
     if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]
@@ -82,7 +92,7 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
             "only beside a baseline that falls in holds, as air that cools or leaves does: it may be the wall's own"
             " relaxation",
         )
-    if is_stretched(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
+    if has_extreme_arm(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
         return _unnamed(
             name,
             "only with the wall's relaxation at the end of its range, where no wall's is: one may imitate the other, or"
@@ -91,11 +101,11 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
     return None
 
 
-def not_shown_of(name: Name, excitation: Excitation) -> str | None:
-    """What is said of an effect of which recordings of one load cycle, or of one rate, hold nothing that shows it.
+def reason_not_shown(name: Name, excitation: Excitation) -> str | None:
+    """Why a name is none: the recordings hold one load cycle, or one rate, in which nothing shows such an effect.
 
-    A set that stays and an arm that relaxes slowly end such a cycle alike; a gain that goes with the rate is another
-    gain at one rate.
+    For example, a permanent set and a slow arm end a single cycle alike, and a rate-dependent gain is another gain at
+    one rate.
     """
     if excitation.hides(name.effect):
         few = "recordings of one loading rate, without a hold, or of none that is seen,"
@@ -107,9 +117,9 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
     return f"{_unnamed(name, f'{few} cannot show it')}; it needs {ways or 'more load cycles'}"
 
 
-def of_no_gas(name: Name, unit: Unit) -> str | None:
-    """What is said of what a gas remembers, where the reading is none of a gas's pressure."""
-    if unit.quantity not in NO_PRESSURES or not is_remembered_by_gas(name.effect):
+def reason_no_gas(name: Name, unit: Unit) -> str | None:
+    """Why an effect of the gas is no cause where the reading is no gas pressure."""
+    if unit.quantity not in NON_PRESSURES or not is_remembered_by_gas(name.effect):
         return None
     return _unnamed(
         name,
@@ -118,32 +128,31 @@ def of_no_gas(name: Name, unit: Unit) -> str | None:
     )
 
 
-def moved_of(name: Name) -> str:
-    """What is said of a latency that is left where readings were moved to the load's clock before."""
+def reason_clocks_aligned(name: Name) -> str:
+    """Why a latency is no cause where readings were shifted to the load's clock before."""
     return _unnamed(
         name, "readings were moved to the load's clock before, each by its own lag, of which it may be a rest"
     )
 
 
-def remembered_of(name: Name) -> str:
-    """What is said of a drift of the zero that may be what effects' arms still remember (`may_be_remembered`)."""
+def limit_remembered(name: Name) -> str:
+    """The sentence on a drift of the zero that the arms of effects may remember (`may_be_remembered`)."""
     return (
         "recordings begin loaded, and what the unit remembers of loads before them would read as"
         f" {in_words(name.effect.name)} does, which is half sure at most (record a rest before the first load)"
     )
 
 
-def few_cycles_of(name: Name, cycles: int) -> str:
-    """What is said of an effect beside as many surer ones as there are load cycles to tell them by."""
+def reason_few_cycles(name: Name, cycles: int) -> str:
+    """Why an effect is no cause where there are as many surer ones as load cycles."""
     said = _unnamed(name, f"so few load cycles ({cycles}) show no more than as many causes")
     return f"{said} (repeat the cycles)"
 
 
-def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> str | None:
-    """What is said of an effect beside a surer one of its mechanism, of whose law it may be the departure.
+def reason_departure(name: Name, names: Sequence[Name], thresholds: Thresholds) -> str | None:
+    """Why an effect is no cause beside a surer one of its mechanism: it may be the error of that one's equation.
 
-    So may a curve be beside a curve that no law follows: what its free form misses is of the load alone. It is none
-    where it is larger than laws depart by.
+    A curve beside a curve that no law follows is treated alike. Not where the effect is larger than laws depart.
     """
     alike = [one for one in names if one.effect.mechanism == name.effect.mechanism != ""]
     if name.effect.is_memoryless and not name.kind_only:
@@ -158,10 +167,13 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
     )
 
 
-def end_of_range_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
-    """What is said of a unit that relaxes more slowly, or faster, than the ``model`` can follow, effects and all."""
+def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+    """The sentence on a unit that relaxes more slowly, or faster, than the baseline can follow."""
     slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
-    if not (slow or fast) or apart(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable:
+    if (
+        not (slow or fast)
+        or rms_difference(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable
+    ):
         return None
     return (
         f"the baseline's relaxation has come to the end of its range, {1.0 / (RATE.lower if slow else RATE.upper):g} s:"
@@ -169,15 +181,19 @@ def end_of_range_of(model: ExtendedModel, sessions: Sequence[Session], threshold
     )
 
 
-def bent_to_the_end_of(model: ExtendedModel, names: Sequence[Name] = ()) -> str | None:
-    """What is said of a curve that would bend farther than its equation can, in a model or by which one is named."""
+def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> str | None:
+    """The sentence on a curve at the end of its range, in the model or as the law that names a block."""
     if ended := [part.name for part in model.parts if part.bends_too_little]:
         return (
             f"{listed(ended, 'and')} has come to the end of its range: the unit bends farther"
             " than that equation can, and what it misses may stand in the names of other effects, which are half sure"
             " at most"
         )
-    by = [(one.effect.name, one.by.fit.model) for one in names if one.by is not None and one.by.fit is not None]
+    by = [
+        (one.effect.name, one.law_in_place.fit.model)
+        for one in names
+        if one.law_in_place is not None and one.law_in_place.fit is not None
+    ]
     if followed := [name for name, fitted in by if fitted.part(name).bends_too_little]:
         return (
             f"{listed(followed, 'and')} has come to the end of its range: the unit bends farther than that equation"
@@ -186,18 +202,18 @@ def bent_to_the_end_of(model: ExtendedModel, names: Sequence[Name] = ()) -> str 
     return None
 
 
-def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
-    """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
+def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+    """The sentence on a leak, or heat, where the stiffness of the wall relative to the gas is not known."""
     units = {one.recording.sensor.unit.quantity for one in sessions}
-    is_of_gas = any(part.effect.stage == "gas" for part in model.parts) and units.isdisjoint(NO_PRESSURES)
-    if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # one is known
+    is_of_gas = any(part.effect.stage == "gas" for part in model.parts) and units.isdisjoint(NON_PRESSURES)
+    if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # the ratio is known
         return None
     softest, stiffest = PAPER_WALL_RATIOS
     gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]
     if any("effective_area_m2" in one.metadata for one in gauges):
         least, most = WALL_RATIOS
         mend = f"mend effective_area_m2: the declared one makes an N beyond {least:g} to {most:g}, which no tube has"
-    elif apart(sessions, model, replace(model, wall_ratio=stiffest)) > thresholds.material:
+    elif rms_difference(sessions, model, replace(model, wall_ratio=stiffest)) > thresholds.material:
         mend = "declare effective_area_m2"
     else:
         return None
@@ -208,21 +224,21 @@ def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds:
     )
 
 
-def worse_of(won: Gain, beyond: str | None) -> str:
-    """What is said of an extension whose gain `is_rejected`; ``beyond``: how loads there go beyond the fitted ones."""
-    low, high = won.ci95
+def limit_rejected(gained: Gain, beyond: str | None) -> str:
+    """The sentence on an extension that is rejected; ``beyond``: how held-out loads exceed the fitted ones."""
+    low, high = gained.ci95
     least, most = (percent(-0.01 * bound) for bound in (high, low))
-    by = f"by {least.removesuffix(' %')} to {most}" if won.is_certain else "which may be chance"
+    by = f"by {least.removesuffix(' %')} to {most}" if gained.is_certain else "which may be chance"
     why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
     return (
-        f"on held-out data the extended model is worse than the baseline ({won.rmse_before:.4g} to"
-        f" {won.rmse_after:.4g} {won.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
+        f"on held-out data the extended model is worse than the baseline ({gained.rmse_before:.4g} to"
+        f" {gained.rmse_after:.4g} {gained.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
         " baseline's until such a recording is among those that are fitted"
     )
 
 
-def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
-    """What is said where recordings that were not fitted are ``off`` by far more than those that were."""
+def limit_held_out_excess(off: float, within: float, beyond: str | None) -> str:
+    """The sentence on recordings that were not fitted and are ``off`` by far more than fitted ones (``within``)."""
     why = beyond or (
         "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
         " changed, or the model follows the fitted ones for a wrong reason"
@@ -230,8 +246,8 @@ def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
     return f"held-out recordings are off by {percent(off)} of full scale, fitted ones by {percent(within)}: {why}"
 
 
-def past_of(zero: Zero, scale: Scale) -> str:
-    """What is said of a zero that may have drifted to where it stands."""
+def limit_zero_drifted(zero: Zero, scale: Scale) -> str:
+    """The sentence on an offset that may be a drift which began before the recordings."""
     value = zero.value * scale.reading
     return (
         f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
@@ -239,32 +255,33 @@ def past_of(zero: Zero, scale: Scale) -> str:
     )
 
 
-def led_back_of(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
-    """What is said of a zero that is led back from loads so high that the unit may do anything below, or from a past.
+def limit_zero_extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
+    """The sentence on a zero that is extrapolated from loads at which the unit was never seen unloaded.
 
-    Of a unit that is unloaded in the recordings, though never as they begin, nothing but its past is unknown.
+    If the unit is unloaded at some time, but not at the start, only its memory of earlier loads is unknown.
     """
     stands = (
         f"the reading stands at {zero.value * scale.reading:.3g} {scale.unit.symbol} ({percent(zero.size)} of full"
         " scale): an offset, a tare, or what the unit"
     )
-    if zero.led_from <= thresholds.standing:
+    if zero.extrapolated_from <= thresholds.standing:
         return (
             f"without load {stands} remembers of loads before the recordings, of which this data shows nothing (record"
             " a rest before the first load)"
         )
     return (
-        f"led back to no load from {percent(zero.led_from)} of it, {stands} does below such loads, or remembers of"
-        " those before, of which this data shows nothing (record a rest without load that the sensor can read)"
+        f"led back to no load from {percent(zero.extrapolated_from)} of it, {stands} does below such loads, or"
+        " remembers of those before, of which this data shows nothing (record a rest without load that the sensor can"
+        " read)"
     )
 
 
-def in_a_tare_of(
+def limit_curves_in_tare(
     zeros: Sequence[Zero], effects: Sequence[Effect], scale: Scale, thresholds: Thresholds
 ) -> tuple[str, ...]:
-    """What is said of ``effects`` that are curves, where the full scale that they are told over holds a tare.
+    """The sentence on curves among ``effects`` whose full scale includes a tare.
 
-    The same curve over another range has other parameters: a parabola's distance from its chord goes by the square.
+    Over another range the same curve has other parameters: a parabola's distance from its chord goes with the square.
     """
     curves = [effect.name for effect in effects if effect.is_memoryless]
     return tuple(
@@ -276,8 +293,8 @@ def in_a_tare_of(
     )
 
 
-def as_the_cell_shows_of(zeros: Sequence[Zero], scale: Scale) -> tuple[str, ...]:
-    """What is said of the force that a calibration gives, where the load cell that it was made by has a tare."""
+def limit_force_as_logged(zeros: Sequence[Zero], scale: Scale) -> tuple[str, ...]:
+    """The sentence on the force of a calibration that was made with a load cell that has a tare."""
     return tuple(
         "a calibration gives the force as the load cell shows it,"
         f" {abs(tare.value) * scale.load_n:.3g} N {'more' if tare.value < 0.0 else 'less'} than what presses (take the"
@@ -287,8 +304,8 @@ def as_the_cell_shows_of(zeros: Sequence[Zero], scale: Scale) -> tuple[str, ...]
     )
 
 
-def crept_of(drift: Name, tare: Zero | None) -> str | None:
-    """What is said of a drift of the zero that a tare may make by creeping, where there is one."""
+def reason_tare_creeps(drift: Name, tare: Zero | None) -> str | None:
+    """Why a drift of the zero is no cause where a tare of that size may creep; None without such a tare."""
     if tare is None:
         return None
     return (
@@ -298,8 +315,8 @@ def crept_of(drift: Name, tare: Zero | None) -> str | None:
     )
 
 
-def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
-    """What is said of recordings of which each has a gain of its own, or several."""
+def limit_own_gains(gains: Sequence[OwnGain]) -> list[str]:
+    """The sentence on recordings with gains of their own."""
     if not gains:
         return []
     told = "all else is told with this allowed for, and no model foresees the gain of another recording"
@@ -313,8 +330,8 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
     ]
 
 
-def own_zeros_of(zeros: OwnZeros | None, scale: Scale) -> list[str]:
-    """What is said of recordings of which each has a zero of its own."""
+def limit_own_zeros(zeros: OwnZeros | None, scale: Scale) -> list[str]:
+    """The sentence on recordings with zeros of their own."""
     if zeros is None:
         return []
     low, high = (int(of(zeros.offsets)) for of in (np.argmin, np.argmax))
@@ -330,8 +347,8 @@ def own_zeros_of(zeros: OwnZeros | None, scale: Scale) -> list[str]:
     ]
 
 
-def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
-    """What is said of recordings in which the reading without load changes at moments."""
+def limit_zero_jumps(changes: Sequence[ZeroChange]) -> list[str]:
+    """The sentence on recordings whose zero jumps."""
     if not changes:
         return []
     return [
@@ -343,15 +360,16 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
 
 
 def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
+    """The first few changes in words, and the number of the others."""
     few = [f"by {percent(one.share, signed=True)} {time_of(one)} in {one.recording}" for one in changes[:SAID]]
     return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 
 
-def nearest_of(found: Inference, thresholds: Thresholds) -> list[str]:
-    """What is said of a law that follows most of what no cause accounts for, and is not named."""
-    if found.nearest is None:
+def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
+    """The sentence on a law that follows most of what the baseline misses and is not named."""
+    if found.nearest_law is None:
         return []
-    effect, left, beside = found.nearest
+    effect, left, beside = found.nearest_law
     return [
         f"{in_words(effect.name)} alone follows most of what the baseline misses ({percent(left)} of full scale"
         f" where it was fitted, {percent(beside)} with it), and so may small imperfections of many kinds,"
@@ -360,13 +378,15 @@ def nearest_of(found: Inference, thresholds: Thresholds) -> list[str]:
     ]
 
 
-def refusals_of(found: Inference) -> list[str]:
-    """What is said of effects that are not named for what others do: taken out again, or undone by one another."""
+def limit_refusals(found: Inference) -> list[str]:
+    """The sentences on effects that cross-validation removed or that cancel one another."""
     if not found.can_validate:
         return [ONE_CYCLE]
     said = []
-    if found.undone:
-        said.append(f"these effects largely cancel one another, so that none is named: {listed(found.undone)}")
+    if found.cancelling_names:
+        said.append(
+            f"these effects largely cancel one another, so that none is named: {listed(found.cancelling_names)}"
+        )
     if found.refused:
         said.append(
             f"tried and left out again: {listed(dict.fromkeys(found.refused))}: of no help in foreseeing recordings or"

@@ -1,4 +1,4 @@
-"""From members of a model to names: how sure each is, what is equivalent to it, and which of them are causes."""
+"""From members of the model to names: how sure each is, what is equivalent to it, and which members are causes."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ from smartshoe.models.effects import Effect, catalogue
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """``kind_probability``: by its odds, that it is this effect or one of ``equivalents``, which nothing tells from it.
+    """A member with the ``effect`` it is named by.
 
-    ``law_probability``: that it is this effect and not its nearest rival in the family, one half in a dead heat.
-    ``kind_only``: its family is what was found; its equation follows no better than others of the family. ``is_sure``:
-    that it is of this family. ``by``: the law as it was fitted in the place of a flexible block, which stays in the
-    model, since the law departs by more than a little and by no more than laws do.
+    ``kind_probability`` is the probability that it is this effect or one of its ``equivalents``, which this data cannot
+    distinguish. ``law_probability`` is that of this law against its nearest rival of the family, one half in a dead
+    heat.
+
+    ``kind_only``: only the family was found, since no equation of it follows better than the others. ``is_sure``: the
+    kind has at least ``least_confidence``. ``law_in_place`` is the law fitted in the place of a flexible block, which
+    names it although the block stays in the model.
     """
 
     member: Member
@@ -31,96 +34,102 @@ class Name:
     equivalents: tuple[str, ...]
     kind_only: bool = False
     is_sure: bool = True
-    by: Alternative | None = None
+    law_in_place: Alternative | None = None
 
 
 def names_of(
     members: Sequence[Member],
-    left: float,
+    residual_rms: float,
     thresholds: Thresholds,
     *,
     is_clocked: bool = False,
     is_unsteady: bool = False,
-    alone: Effect | None = None,
+    best_single: Effect | None = None,
 ) -> tuple[Name, ...]:
-    """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
+    """The causes among ``members``, largest first; ``residual_rms`` is the structure that no member explains.
 
-    * Where some are sure: these. Beside them, where one of the sure has a law, others above ``tolerable`` that are
-      likelier there than not (another effect's shadow is seldom so large), or that cannot be ruled out and are larger
-      than what the laws of the sure ones usually depart by.
-    * Where none is sure: those that cannot be ruled out and are larger than all that is left; else the one of
-      the kind that does most ``alone``, if it cannot be ruled out. Each is half sure at most.
+    * If some are sure: these. If one of them has a law, also others above ``tolerable`` that are more probable than not
+      (another effect's shadow is seldom that large), or that cannot be ruled out and exceed the usual departure of the
+      sure ones' laws.
+    * If none is sure: those that cannot be ruled out and exceed ``residual_rms``; failing these, one of the kind of
+      ``best_single``, if it cannot be ruled out. Each is half sure at most.
 
-    ``is_clocked``: peak loads grow or fall with time, so that effects that go with it imitate each other, and curves:
-    these are half sure at most. So is what is no curve beside one that would bend farther than its equation can, since
-    it may be what that misses. ``is_unsteady``: zeros change at moments, of which some may not be seen and may imitate
-    any effect: all are half sure at most. A flexible block, and a curve that lies where its kind ends, is named by the
-    law that comes nearest; no name is told twice.
+    ``is_clocked``: peak loads rise or fall with time, so that effects that go with time imitate each other and curves;
+    these are half sure at most. So is any memory effect together with a curve at the end of its range, since it may be
+    what that curve misses. ``is_unsteady``: zeros jump, and unseen jumps may imitate any effect, so that all are half
+    sure at most. Flexible blocks, and curves at the end of their kind, carry the name of the nearest law; no name is
+    given twice.
     """
-    likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
-    likely = [_with_untold(name, thresholds) for name in likely]
+    named = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
+    named = [_with_confounded(name, thresholds) for name in named]
     is_bent = any(one.bends_too_little for one in members)
-    likely = [
-        doubted(name)
+    named = [
+        capped_at_half(name)
         if is_unsteady
         or (is_clocked and name.effect.goes_with_the_clock)
         or (is_bent and not name.member.effect.is_memoryless)
         else name
-        for name in likely
+        for name in named
     ]
-    # Beside a law a block of which it is the nearest is what that law departs by: one name.
+    # A block named after a law that is in the model itself is only that law's departure: one name.
     first: dict[str, Name] = {}
-    for one in sorted(likely, key=lambda one: (one.is_sure, one.member.size), reverse=True):
+    for one in sorted(named, key=lambda one: (one.is_sure, one.member.size), reverse=True):
         first.setdefault(one.effect.name, one)
-    likely = [one for one in likely if first[one.effect.name] is one]
-    found = {one.effect.name for one in likely}  # what is there itself stands for no other
-    likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
+    named = [one for one in named if first[one.effect.name] is one]
+    found = {one.effect.name for one in named}  # an effect that is in the model is no equivalent of another
+    named = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in named]
     odds = thresholds.equivalent_odds
-    possible = [one for one in likely if one.kind_probability > odds * (1.0 - one.kind_probability)]
-    if sure := [one for one in likely if one.is_sure]:
+    possible = [one for one in named if one.kind_probability > odds * (1.0 - one.kind_probability)]
+    if sure := [one for one in named if one.is_sure]:
         is_firm = not all(one.kind_only for one in sure)  # not beside a kind that no law follows
-        departed = thresholds.departure * math.hypot(*(one.member.size for one in sure))
-        beside = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
-        beside = [one for one in beside if confidence_of(one, thresholds) > 0.5 or one.member.size > departed]
-        return tuple(one for one in likely if one in sure or one in beside)
-    if larger := [one for one in possible if one.member.size > left]:
-        return tuple(doubted(one) for one in larger)
-    if alone is None:
+        max_departure = thresholds.departure * math.hypot(*(one.member.size for one in sure))
+        companions = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
+        companions = [
+            one for one in companions if confidence_of(one, thresholds) > 0.5 or one.member.size > max_departure
+        ]
+        return tuple(one for one in named if one in sure or one in companions)
+    if larger := [one for one in possible if one.member.size > residual_rms]:
+        return tuple(capped_at_half(one) for one in larger)
+    if best_single is None:
         return ()
-    by_itself = (one for one in possible if one.member.effect.kind == alone.kind)
-    return tuple(doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
+    by_itself = (one for one in possible if one.member.effect.kind == best_single.kind)
+    return tuple(capped_at_half(one) for one in by_itself if one.member.size > thresholds.tolerable)
 
 
-def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
-    kind = probability_of_kind(one, left, thresholds)
+def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
+    """The name of one member."""
+    kind = probability_of_kind(one, residual_rms, thresholds)
     is_sure = kind >= thresholds.least_confidence
-    by = _law_in_its_place(one)
-    if by is not None and by.margin <= thresholds.departure**2 * one.fall:
-        # The block is how that law departs: the others are weighed against it.
-        followed = catalogue()[str(by.effect)]
-        kin = _kin_of(followed) or tuple(str(a.effect) for a in one.laws if a is not by)  # of a curve, any other one
-        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
-        as_law = replace(one, laws=beside, fall=one.fall - by.margin)
-        return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
+    law_in_place = _law_in_its_place(one)
+    if law_in_place is not None and law_in_place.margin <= thresholds.departure**2 * one.fall:
+        # The block is how that law departs: its rivals are compared with that law.
+        followed = catalogue()[str(law_in_place.effect)]
+        # A curve that is alone in its kind has all other curves as rivals.
+        kin = _other_laws_of_family(followed) or tuple(str(a.effect) for a in one.laws if a is not law_in_place)
+        other_laws = tuple(replace(a, margin=a.margin - law_in_place.margin) for a in one.laws if a.effect in kin)
+        as_law = replace(one, laws=other_laws, fall=one.fall - law_in_place.margin)
+        return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, law_in_place)
     if not (one.effect.is_flexible or one.is_any_curve):
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
-    nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
-    others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
+    nearest = _nearest_of_kind(one) if law_in_place is None else catalogue()[str(law_in_place.effect)]
+    # The laws fitted in its place are of the family, or for a curve all other curves.
+    others = dict.fromkeys((*_other_laws_of_family(nearest), *(str(a.effect) for a in one.laws)))
     others.pop(nearest.name, None)
-    # One that follows less than half of it is none that it may be.
+    # A law that follows less than half of it is no equivalent.
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
     kin = tuple(name for name in others if name not in ruled_out)
     return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 
 
-def _with_untold(name: Name, thresholds: Thresholds) -> Name:
-    """Also equivalent are laws of other kinds that nothing tells from it and that follow it as its own would.
+def _with_confounded(name: Name, thresholds: Thresholds) -> Name:
+    """The name with those confounded laws as equivalents that follow it as well as laws usually do.
 
-    A law of its kind, or the free form, follows what its equation departs by, and misses what that departs by again.
+    The bound is the square of the usual departure: a law follows what this equation departs by, and departs again
+    itself.
     """
     member = name.member
-    alike = [one for one in member.untold if one.margin <= thresholds.departure**4 * member.fall]
+    alike = [one for one in member.confounded if one.margin <= thresholds.departure**4 * member.fall]
     if not alike:
         return name
     others = dict.fromkeys((*name.equivalents, *(str(one.effect) for one in alike)))
@@ -130,7 +139,7 @@ def _with_untold(name: Name, thresholds: Thresholds) -> Name:
 
 
 def _law_in_its_place(one: Member) -> Alternative | None:
-    """The law that is named where it misses little: of any curve the nearest, of another block `_nearest_of_kind`."""
+    """The law to name a block by: of a generic curve the nearest, of another block `_nearest_of_kind`."""
     if one.is_any_curve:
         return next(iter(one.laws), None)
     if not one.effect.is_flexible:
@@ -139,15 +148,15 @@ def _law_in_its_place(one: Member) -> Alternative | None:
     return next((a for a in one.laws if a.effect == nearest), None)
 
 
-def _kin_of(law: Effect) -> tuple[str, ...]:
-    """The other laws of its family, and of those that count as its members."""
+def _other_laws_of_family(law: Effect) -> tuple[str, ...]:
+    """The other laws of a law's family, and those that count as its members."""
     return tuple(one.name for one in catalogue().values() if one.kind == law.kind and one is not law)
 
 
 def _nearest_of_kind(block: Member) -> Effect:
-    """The law of a block's family that comes nearest; of no curve one of another stage.
+    """The nearest law of a block's family, except for curves of the block's own stage.
 
-    What grows with the load borne is none that goes with the clock.
+    An effect that grows with the load borne is none that goes with time alone.
     """
     family = [e for e in catalogue().values() if e.family == block.effect.family]
     alike = [e for e in family if e.stage == block.effect.stage and not block.effect.is_memoryless]
@@ -155,31 +164,32 @@ def _nearest_of_kind(block: Member) -> Effect:
     return min(alike or family, key=lambda e: margins.get(e.name, math.inf))
 
 
-def doubted(name: Name) -> Name:
-    """The name, half sure at most."""
+def capped_at_half(name: Name) -> Name:
+    """The name with a probability of one half at most, and not sure."""
     return replace(name, kind_probability=min(name.kind_probability, 0.5), is_sure=False)
 
 
-def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:
-    """That an effect of this family is there: a logistic of three ratios, each without a unit, and the evidence for it.
+def probability_of_kind(one: Member, residual_rms: float, thresholds: Thresholds) -> float:
+    """The probability that an effect of this family is there.
 
-    What no equation follows over the effect's size: structure that is ``left``, and what the other effects' equations
-    are asked to depart by (one that is as small as that is likely another's shadow). How far its own equation is asked
-    to depart. How alike what it adds is to what another effect adds.
+    A logistic of three dimensionless ratios, times the evidence against nothing in its place. The ratios are: what no
+    equation follows over the effect's size (the ``residual_rms`` and the departures of the other effects), how far its
+    own equation departs, and how alike it is to another effect.
     """
     intercept, per_left, per_departed, per_likeness = thresholds.kind_odds
-    left = math.hypot(left, one.others_depart)
-    ratio = (left + thresholds.imperfection) / (one.size + thresholds.imperfection)
-    score = intercept + per_left * math.log(ratio) + per_departed * one.departed
+    residual_rms = math.hypot(residual_rms, one.others_departure_rms)
+    ratio = (residual_rms + thresholds.imperfection) / (one.size + thresholds.imperfection)
+    score = intercept + per_left * math.log(ratio) + per_departed * one.departure_sds
     score += per_likeness * one.likeness
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 
 
 def confidence_of(name: Name, thresholds: Thresholds) -> float:
-    """That it is what it is named, or one of its equivalents: more than by its odds where it is sure, else no more.
+    """The probability that it is what it is named, or one of its equivalents.
 
-    Half at most where no law of the kind follows: it may be of a law, or a kind, that the catalogue does not have.
+    Higher than the odds where it is sure; at most one half where no law of the kind follows, since the law, or the
+    kind, may be one that the catalogue does not have.
     """
     kind = name.kind_probability
     if name.kind_only:
@@ -190,20 +200,17 @@ def confidence_of(name: Name, thresholds: Thresholds) -> float:
 
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
-    """That it is this law of its family, and the laws that this data cannot tell from it.
-
-    It is held against its nearest rival: one half in a dead heat.
-    """
+    """The probability of this law against its nearest rival, and the laws that this data cannot rule out."""
     odds = {a.effect: float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws if a.effect is not None}
     equivalents = tuple(name for name, other in odds.items() if other > thresholds.equivalent_odds)
     return 1.0 / (1.0 + max(odds.values(), default=0.0)), equivalents
 
 
 def odds_of_law(margin: Array | float, fall: float, thresholds: Thresholds) -> Array:
-    """Odds of another law in the place of one that brings ``fall`` of -2 log likelihood and follows ``margin`` better.
+    """Odds of a rival law that fits worse by ``margin``, where the named law brings ``fall`` (-2 log likelihood).
 
-    No law is exact: another one that explains all but the square of the usual departure, of what this one explains, is
-    as good. So the margin is counted in units of that square, and of one look at noise.
+    No law is exact: a rival that misses no more than the squared usual departure of what this law explains is as good.
+    So the margin is counted in units of that square plus one, the usual gain from noise alone.
     """
     unit = 2.0 * (1.0 + thresholds.departure**2 * max(fall, 0.0))
     return np.exp(-np.maximum(margin, 0.0) / unit)

@@ -1,4 +1,4 @@
-"""Which of the channels that were read along is the neighbour whose pressure the reading may hold."""
+"""Which of the channels logged alongside is the neighbour whose pressure the reading may contain (cross talk)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from smartshoe.signals.masks import bridged
 
 
 def neighbours_of(recording: Recording) -> list[Channel]:
-    """Other units' readings beside the one that is diagnosed."""
+    """The readings of units other than the one that is diagnosed."""
     quantity = recording.sensor.unit.quantity
     others = (one for one in recording.of_role("auxiliary") if one.unit.quantity == quantity)
     return [one for one in others if one.name != "reference" and one.present.any()]
@@ -25,20 +25,20 @@ def neighbours_of(recording: Recording) -> list[Channel]:
 def with_one_neighbour(
     recordings: Sequence[Recording], count: int, usable: Sequence[Mask], thresholds: Thresholds
 ) -> tuple[list[Recording], list[str]]:
-    """The recordings with one neighbour at most, and what is said of the others.
+    """The recordings with one neighbour at most, and sentences on the others.
 
-    It is the one that readings of the first ``count``, which are fitted, follow best beside what their loads foretell.
-    What foretells a reading to less than the reading's own noise is the same channel once more, and no neighbour.
+    It is the one that the readings of the first ``count``, fitted, recordings follow best beyond what their loads
+    predict. A channel that predicts the reading to less than the reading's noise is a copy of it, and no neighbour.
     """
-    of_use = [(one, mask) for one, mask in zip(recordings, usable, strict=True) if mask.any()]
-    fitted = of_use[: sum(bool(mask.any()) for mask in usable[:count])]
-    names = list(dict.fromkeys(channel.name for one, _ in of_use for channel in neighbours_of(one)))
+    readable = [(one, mask) for one, mask in zip(recordings, usable, strict=True) if mask.any()]
+    fitted = readable[: sum(bool(mask.any()) for mask in usable[:count])]
+    names = list(dict.fromkeys(channel.name for one, _ in readable for channel in neighbours_of(one)))
     if not names:
         return [*recordings], []
     shared = [n for n in names if all(n in [c.name for c in neighbours_of(one)] for one, _ in fitted)]
-    sums = {n: [_beside(one, one[n], mask, thresholds) for one, mask in fitted] for n in shared}
+    sums = {n: [_neighbour_sums(one, one[n], mask, thresholds) for one, mask in fitted] for n in shared}
     copies = [n for n in shared if any(one.is_copy for one in sums[n])]
-    followed = {n: _followed(sums[n]) for n in shared if n not in copies}
+    followed = {n: _covaried_power(sums[n]) for n in shared if n not in copies}
     kept = max(followed, key=lambda n: followed[n], default=None)
     said = [f"{', '.join(copies)} reads as the unit does, noise and all: it is no neighbour"] if copies else []
     if passed := [n for n in names if n not in (kept, *copies)]:
@@ -48,36 +48,38 @@ def with_one_neighbour(
 
 
 @dataclass(frozen=True, slots=True)
-class _Beside:
-    """Sums over one recording of what its load does not foretell: reading times neighbour, and neighbour squared."""
+class _NeighbourSums:
+    """Sums over a recording, beyond what its load predicts: of reading times neighbour, and of neighbour squared."""
 
     product: float
     square: float
     is_copy: bool
 
 
-def _followed(sums: Sequence[_Beside]) -> float:
+def _covaried_power(sums: Sequence[_NeighbourSums]) -> float:
+    """The squared covariance of reading and neighbour over the neighbour's power."""
     square = sum(one.square for one in sums)
     return sum(one.product for one in sums) ** 2 / square if square > 0.0 else 0.0
 
 
-def _beside(recording: Recording, neighbour: Channel, usable: Mask, thresholds: Thresholds) -> _Beside:
-    """By the load, its square and what relaxes behind it (``memory_s``)."""
+def _neighbour_sums(recording: Recording, neighbour: Channel, usable: Mask, thresholds: Thresholds) -> _NeighbourSums:
+    """The sums beyond what the load predicts by itself, its square and its lags (``memory_s``)."""
     sensor, load = recording.sensor, recording.load
     mask = usable & sensor.present & load.present & neighbour.present
     if not mask.any():
-        return _Beside(0.0, 0.0, False)
+        return _NeighbourSums(0.0, 0.0, False)
     force = bridged(recording.time_s, load.values, load.present)
     behind = [lagged(force, recording.sample_time_s, tau_s) for tau_s in thresholds.memory_s]
-    foretold = np.column_stack([np.ones(force.size), force, force**2, *behind])[mask]
+    load_terms = np.column_stack([np.ones(force.size), force, force**2, *behind])[mask]
     reading, other = sensor.values[mask], neighbour.in_unit(sensor.unit)[mask]
-    as_well = np.column_stack([np.ones(other.size), other])
-    left, left_of_other = _left(foretold, reading), _left(foretold, other)
-    # Of what the load does not foretell: fast loads bend a reading as noise does.
-    is_copy = float(np.std(_left(as_well, reading))) < (1.0 - thresholds.same) * noise_sd(left, thresholds)
-    return _Beside(float(left @ left_of_other), float(left_of_other @ left_of_other), is_copy)
+    with_neighbour = np.column_stack([np.ones(other.size), other])
+    left, other_left = _residuals(load_terms, reading), _residuals(load_terms, other)
+    # Compared with the noise beyond the load's prediction, since fast loads bend a reading as noise does.
+    is_copy = float(np.std(_residuals(with_neighbour, reading))) < (1.0 - thresholds.same) * noise_sd(left, thresholds)
+    return _NeighbourSums(float(left @ other_left), float(other_left @ other_left), is_copy)
 
 
-def _left(columns: Array, values: Array) -> Array:
+def _residuals(columns: Array, values: Array) -> Array:
+    """(n,) residuals of ``values`` after least squares on ``columns``."""
     scaled = columns / np.maximum(np.abs(columns).max(axis=0), 1e-300)
     return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])

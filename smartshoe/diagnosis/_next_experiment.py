@@ -14,7 +14,7 @@ from smartshoe.diagnosis._experiments import EXPERIMENTS, paced
 from smartshoe.diagnosis._gains_and_zeros import changes_of, time_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
-from smartshoe.diagnosis._members import begun_with
+from smartshoe.diagnosis._members import start_with
 from smartshoe.diagnosis._ranges import rounded
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._sensitivity import logged_words
@@ -46,15 +46,18 @@ def next_experiment(
     open_: bool,
     worse: bool = False,
 ) -> NextExperiment | None:
-    """What to do next, where anything is open.
+    """The next experiment, or None where nothing is open.
 
-    For the largest doubtful cause that any protocol tells from its nearest equivalent: the shortest such, a channel.
+    It is the first of these that applies:
 
-    Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
-    Where neither parts any, but recordings have gains of their own, one of them again. Where they have not, and
-    something is left (``open_``), or a name is not sure, what this data never showed; else what tells a zero that is
-    seen from a tare, or that either may be used of what is in doubt, None where nothing is. Where a single load cycle
-    tells no cause, more of them.
+    * the extension is ``worse`` on held-out data: record such loads again, and fit them;
+    * the largest doubtful cause that a protocol separates from its nearest equivalent: the shortest such protocol;
+    * such a cause that a channel would separate: log that channel;
+    * recordings have own gains, or zeros that jump: repeat one of them;
+    * a single load cycle shows no cause: record more cycles;
+    * structure is left (``open_``), or a name is unsure: the protocol that shows what this data lacks;
+    * a zero that a rest shows may be a tare: a reference that distinguishes them;
+    * else that no protocol separates the rivals, where there are any.
     """
     pair = _pair(causes)
     if worse:
@@ -62,15 +65,15 @@ def next_experiment(
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(pair, "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.part is not None]
-    told: list[NextExperiment] = []
+    proposed: list[NextExperiment] = []
     for cause in sorted(doubtful, key=lambda one: -one.size):
-        told.append(_told_apart(found, cause, sessions, excitation.thresholds))
-        if told[-1].protocol:
-            return _with_its_loads(told[-1], sessions, excitation.thresholds)
-    if by_channel := [one for one in told if one.channel]:
+        proposed.append(_separating_experiment(found, cause, sessions, excitation.thresholds))
+        if proposed[-1].protocol:
+            return _with_its_loads(proposed[-1], sessions, excitation.thresholds)
+    if by_channel := [one for one in proposed if one.channel]:
         return by_channel[0]
     if found.own_gains or found.zero_changes:
-        return NextExperiment(pair, "repeat", None, _again(found))
+        return NextExperiment(pair, "repeat", None, _what_to_repeat(found))
     if not found.can_validate:
         says = (
             "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be"
@@ -81,14 +84,14 @@ def next_experiment(
     zeros = [cause for cause in causes if cause.equivalents and cause.part is None]
     is_unsure = any(cause.confidence < least for cause in causes)
     if open_ or is_unsure or not all(effect(one.name).exposed_by <= excitation.present for one in zeros):
-        unseen = _unseen(found, pair, excitation, _least_step_s(sessions))
+        unseen = _protocol_for_missing_excitation(found, pair, excitation, _least_step_s(sessions))
         return _with_its_loads(unseen, sessions, excitation.thresholds)
     by_reference = (_by_reference(zero, sessions) for zero in zeros)
-    return next((one for one in by_reference if one is not None), told[0] if told else None)
+    return next((one for one in by_reference if one is not None), proposed[0] if proposed else None)
 
 
 def _by_reference(zero: Cause, sessions: Sequence[Session]) -> NextExperiment | None:
-    """What tells a zero that a rest shows from its equivalent, as the catalogue has it: no load does."""
+    """The reference that distinguishes a zero from its equivalent, where the catalogue has one; no load does."""
     word = _channel(zero.name, zero.equivalents[0], sessions)
     if word is None:
         return None
@@ -96,33 +99,34 @@ def _by_reference(zero: Cause, sessions: Sequence[Session]) -> NextExperiment | 
     return NextExperiment((zero.name, *zero.equivalents), None, in_words(word), says)
 
 
-def _with_its_loads(told: NextExperiment, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
-    """Also how high and how fast its protocol loads, and what it asks of a machine that was seen doing less."""
-    if told.steps is None:
-        return told
-    rate, recorded = told.steps.peak_rate_n_per_s, max(_fastest_n_per_s(one.recording) for one in sessions)
-    asks = f"it loads to {rounded(told.steps.peak_load_n)} N at up to {rounded(rate)} N/s"
+def _with_its_loads(proposed: NextExperiment, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
+    """``proposed`` with its protocol's highest load and fastest rate, and whether these exceed the recorded ones."""
+    if proposed.steps is None:
+        return proposed
+    rate, recorded = proposed.steps.peak_rate_n_per_s, max(_fastest_n_per_s(one.recording) for one in sessions)
+    asks = f"it loads to {rounded(proposed.steps.peak_load_n)} N at up to {rounded(rate)} N/s"
     if rate > (1.0 + thresholds.same) * recorded:
         asks += (
             f", faster than anything recorded (up to {rounded(recorded)} N/s): if the machine cannot, let its fast"
             " ramps take longer, and expect it to tell less"
         )
-    return replace(told, says=f"{told.says}; {asks}")
+    return replace(proposed, says=f"{proposed.says}; {asks}")
 
 
 def _fastest_n_per_s(recording: Recording) -> float:
-    """How fast a load was put on or taken off: over whole ramps, or by most of the way where they are in steps."""
+    """The fastest rate of the load in N/s: over whole ramps, or over most of the way where it goes in steps."""
     time_s, load_n = recording.time_s, recording.force_n
     by_way = (rate_range([(time_s, sign * load_n)])[1] for sign in (1.0, -1.0))
     return max([*by_way, *(abs(one.rate_n_per_s) for one in ramps(time_s, load_n))])
 
 
-def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
+def _separating_experiment(
+    found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds
+) -> NextExperiment:
     """The shortest protocol that rules a cause's nearest equivalent out, or tells clearly more than this data.
 
-    Of those that this data does not hold already, each as slow as its logger asks for, of which that takes enough
-    samples to tell anything. Where none rules it out, the channel that would, if there is one. What is foretold is a
-    unit of the cause: of another one nothing is said.
+    Protocols that this data already holds are left out, and each is as slow as the logger needs. If none rules the
+    rival out, the channel that would, if there is one. The predictions are for a unit that has the cause.
     """
     rival = cause.equivalents[0]
     now = _contest(found, cause, rival)
@@ -130,28 +134,28 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     made = [paced(make(peak_n), least_s, thresholds) for make in EXPERIMENTS.values()]
     made = [one for one in made if one.duration_s > (thresholds.least_samples - 1) * least_s]
     held = now.cause.likelihood.sessions
-    left = [one for one in made if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
-    no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
-    of_use = min(thresholds.clear * now.log_odds, _ruled_out_at(thresholds))
-    foretold: list[tuple[Protocol, Contest]] = []
+    left = [one for one in made if not any(_is_run_of(one, session, peak_n, thresholds.same) for session in held)]
+    no_name = -2.0 * math.log(thresholds.false_name)  # a smaller gain separates nothing
+    min_log_odds = min(thresholds.clear * now.log_odds, _ruled_out_at(thresholds))
+    predicted: list[tuple[Protocol, Contest]] = []
     for protocol in sorted(left, key=lambda one: one.duration_s):
-        then = now.after(protocol, least_s, no_name, of_use)
+        then = now.after_experiment(protocol, least_s, no_name, min_log_odds)
         if then is not None:
-            foretold.append((protocol, then))
+            predicted.append((protocol, then))
             if _rules_out(then, thresholds):
                 break
     names, both = (cause.name, *cause.equivalents), listed((cause.name, rival), "and")
     no_use = f"if it is {in_words(cause.name)}, no protocol is expected to rule out {in_words(rival)}"
-    chosen, word = _most_telling(now, foretold, thresholds), _channel(cause.name, rival, sessions)
+    chosen, word = _most_telling(now, predicted, thresholds), _channel(cause.name, rival, sessions)
     channel = None if word is None else in_words(word)
     if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
-        most = max((then.margin - now.margin for _, then in foretold), default=0.0)
+        most = max((then.margin - now.margin for _, then in predicted), default=0.0)
         lost = [name for name in (cause.name, rival) if effect(name).why_not_undone]
         instead = "use either for loads like those recorded, under which they read too nearly alike"
         if len(lost) == 1:
             why = effect(lost[0]).why_not_undone
-            stays = f"the {in_words(lost[0])} stays in the force, since {why}"
-            instead = f"under loads like those recorded they read too nearly alike, but {stays}"
+            stays_still = f"the {in_words(lost[0])} stays in the force, since {why}"
+            instead = f"under loads like those recorded they read too nearly alike, but {stays_still}"
         if word is not None:
             instead = f"what would is {SAYS[word]}"
         says = f"{no_use}: {instead}"
@@ -167,36 +171,36 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
 
 
 def _least_step_s(sessions: Sequence[Session]) -> float:
-    """The time from sample to sample of the recording that was logged most quickly."""
+    """The sampling interval of the most quickly logged recording."""
     return min(one.recording.sample_time_s for one in sessions)
 
 
 def _rules_out(contest: Contest, thresholds: Thresholds) -> bool:
-    """Whether the rival would be no equivalent any more."""
+    """Whether the rival would no longer be an equivalent."""
     return contest.log_odds >= _ruled_out_at(thresholds)
 
 
 def _ruled_out_at(thresholds: Thresholds) -> float:
-    """The log odds from which on a rival is no equivalent."""
+    """The log odds from which a rival is no equivalent."""
     return -math.log(thresholds.equivalent_odds)
 
 
 def _most_telling(
-    now: Contest, foretold: Sequence[tuple[Protocol, Contest]], thresholds: Thresholds
+    now: Contest, predicted: Sequence[tuple[Protocol, Contest]], thresholds: Thresholds
 ) -> tuple[Protocol, Contest] | None:
-    """Of what is ``foretold``, shortest first, the last, if it ends the doubt; else what tells clearly more than now.
+    """Of the ``predicted`` contests, shortest protocol first, the last if it rules the rival out.
 
-    Of several that tell about as much as the best the shortest.
+    Else the shortest that tells clearly more than now and about as much as the best, or None.
     """
-    if foretold and _rules_out(foretold[-1][1], thresholds):
-        return foretold[-1]
-    most = max((then.log_odds for _, then in foretold), default=0.0)
+    if predicted and _rules_out(predicted[-1][1], thresholds):
+        return predicted[-1]
+    most = max((then.log_odds for _, then in predicted), default=0.0)
     least = max(thresholds.clear * now.log_odds, most / thresholds.clear)
-    return next((one for one in foretold if one[1].log_odds > least), None)
+    return next((one for one in predicted if one[1].log_odds > least), None)
 
 
-def _is_of(protocol: Protocol, session: Session, peak_n: float, same: float) -> bool:
-    """Whether a recording is of this protocol, but for its end, and for how exactly a machine follows and is logged."""
+def _is_run_of(protocol: Protocol, session: Session, peak_n: float, same: float) -> bool:
+    """Whether a recording is a run of this protocol, within the accuracy of a machine and except for its end."""
     time_s = session.conditions.time_s
     asked = protocol.load_at(time_s) / peak_n
     off = float(np.std(session.conditions.load - asked))
@@ -204,12 +208,12 @@ def _is_of(protocol: Protocol, session: Session, peak_n: float, same: float) -> 
 
 
 def _contest(found: Inference, cause: Cause, rival: str) -> Contest:
-    """A cause and its rival as they were fitted, or, of those that were not, as they are fitted now.
+    """A cause and its rival as they were fitted, or fitted now if they were not.
 
-    Beside both what is a drift is held alike: they are told apart by loads that last for longer.
+    Drifts are held alike in both: only loads that last longer distinguish them.
     """
     (member,) = (one for one in found.members if one.name == cause.part)
-    fits = {one.effect: one.fit for one in (*member.laws, *member.untold)}
+    fits = {one.effect: one.fit for one in (*member.laws, *member.confounded)}
 
     def fitted(name: str) -> Fit:
         if name == member.name:
@@ -217,11 +221,11 @@ def _contest(found: Inference, cause: Cause, rival: str) -> Contest:
         one = fits.get(name) or _in_place_of(found, member.name, name)
         return replace(one, model=one.model.held_as(found.fit.model))
 
-    return Contest(fitted(cause.name), fitted(rival), member.without).settled()
+    return Contest(fitted(cause.name), fitted(rival), member.without).refitted()
 
 
-def _again(found: Inference) -> str:
-    """What to record once more where gains differ, or where they or zeros change."""
+def _what_to_repeat(found: Inference) -> str:
+    """What to record again where gains differ, or where they or zeros change."""
     for what, changes in (("gain", changes_of(found.own_gains)), ("zero", found.zero_changes)):
         if changes:
             return (
@@ -237,26 +241,28 @@ def _again(found: Inference) -> str:
 def _in_place_of(found: Inference, name: str, rival: str) -> Fit:
     """The fit with ``rival`` in the place of an effect."""
     less = found.fit.model.without(name)
-    return fit(found.fit.likelihood, begun_with(effect(rival), less, found.fit.likelihood))
+    return fit(found.fit.likelihood, start_with(effect(rival), less, found.fit.likelihood))
 
 
 def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:
-    """The largest cause that has equivalents with these, else the largest with its nearest rival; () where none has."""
+    """The largest cause with its equivalents, else the largest with its nearest rival; empty without either."""
     others = [(cause, cause.equivalents) for cause in causes]
     others += [(cause, tuple(rival.effect for rival in cause.rivals[:1])) for cause in causes]
     return next(((cause.name, *names) for cause, names in others if names), ())
 
 
-def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation, sample_time_s: float) -> NextExperiment:
-    """The first protocol that holds what this data lacks; the same again where it lacks nothing.
+def _protocol_for_missing_excitation(
+    found: Inference, names: tuple[str, ...], excitation: Excitation, sample_time_s: float
+) -> NextExperiment:
+    """The first protocol that shows what this data lacks, or a repetition where it lacks nothing.
 
-    Before all others what would tell the first of ``names`` from the rest, as the catalogue has it.
+    What would separate the first of ``names`` from the others, by the catalogue, comes first.
     """
     peak_n = found.fit.model.full_scale_load_n
     telling = {word for rival in names[1:] for word in told_apart_by(effect(names[0]), effect(rival))}
     lacking = [word for word in SHOWN_BY if word not in excitation.present]
     lacking.sort(key=lambda word: word not in telling)
-    if excitation.goes_with_the_clock:  # which by itself leaves every cause half sure
+    if excitation.goes_with_the_clock:  # which alone leaves every cause half sure
         lacking.sort(key=lambda word: word != "shuffled_loads")
     if lacking:
         name = SHOWN_BY[lacking[0]]
@@ -268,6 +274,6 @@ def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation, sa
 
 
 def _channel(name: str, rival: str, sessions: Sequence[Session]) -> Exposure | None:
-    """The channel that the catalogue says would tell them apart, if it was not logged already."""
+    """The channel that would separate the two, by the catalogue, if it is not logged already."""
     lacking = (told_apart_by(effect(name), effect(rival)) & CHANNELS) - logged_words(sessions)
     return min(lacking, default=None)

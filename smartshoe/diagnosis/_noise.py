@@ -1,4 +1,4 @@
-"""What counts as noise: what is left, each stretch over which it is correlated counted once."""
+"""What counts as noise: the residual, with each correlation time counted once."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.signals.noise import autocovariance
 
-ROUNDING = 1e-9  # share of full scale: what it leaves where nothing else is left
-FLOOR = 1e-6  # share of full scale: no sensor is better, and less than that of noise leaves rounding to decide
+ROUNDING = 1e-9  # share of full scale: rounding, which remains where nothing else is left
+FLOOR = 1e-6  # share of full scale: no sensor is better, and with less noise rounding would decide
 
 
-def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
-    """Standard deviation of the white noise that is worth as much as ``residuals`` (n,) each, where ``kept``, are.
+def effective_noise_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
+    """Standard deviation of white noise that carries as much information as ``residuals`` (n,) where ``kept``.
 
-    Least squares is the best predictor where what is left is an error of the model; its samples say the same thing
-    again for as long as they are correlated, and so count only once each correlation time beside a prior
-    (Box and Jenkins 1976, variance of a mean of correlated samples).
+    Least squares is the best predictor where the residual is an error of the model. Correlated samples repeat one
+    another, so that against a prior each correlation time counts once (Box and Jenkins 1976, variance of a mean of
+    correlated samples).
     """
     square, count, repeated = 0.0, 0, 0.0
     for residual, mask in zip(residuals, kept, strict=True):

@@ -1,4 +1,4 @@
-"""Kinds of noise in what the chosen model leaves: after the data's own faults, and beside the causes."""
+"""Kinds of noise in the residual of the chosen model, in addition to data faults and causes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smartshoe.integrity import DataFault
 from smartshoe.models.effects import NoiseEffect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
-# A sample that repeats the one before it lags like jitter; a dropout or a spike makes the variance follow the load.
+# A repeated sample lags like jitter; a dropout or a spike makes the variance follow the load.
 IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"})
 
 
@@ -23,13 +23,14 @@ def noise_kinds(
     material: float,
     memory: GaussMarkov | None,
 ) -> list[DataFault]:
-    """What the residual at the full rate shows, for recordings in which no fault of the data would imitate it.
+    """The kinds of noise that the residual at the full rate shows, in recordings without a fault that imitates them.
 
-    Where structure is left that no effect has ``explained``, it would be taken for coloured noise. Where no load cycle
-    repeats, the ``memory`` of what is left tells of it. Nothing weaker than ``material`` (share of full scale) counts.
+    Where structure is left that is not ``explained`` it would be taken for coloured noise, which is then not sought.
+    The ``memory`` of the residual shows it where no load cycle repeats. Noise below ``material`` (share of full scale)
+    does not count.
     """
     kinds = [one for one in catalogue().values() if isinstance(one, NoiseEffect)]
-    kinds.sort(key=lambda one: one.has_memory)  # what most looks like other things is told last
+    kinds.sort(key=lambda one: one.has_memory)  # last, what is most easily imitated
     found = []
     for session in fine:
         faults = {fault.kind for fault in known if fault.recording == session.index}
@@ -60,6 +61,7 @@ def noise_kinds(
 
 
 def _throughout(session: Session, kind: str, says: str) -> DataFault:
+    """A minor data fault over the whole of a recording."""
     start_s = float(session.recording.time_s[0])
     stop_s = start_s + float(session.conditions.time_s[-1])
     return DataFault(kind, session.index, session.recording.label, start_s, stop_s, 1.0, says, "minor")

@@ -1,4 +1,4 @@
-"""Recordings made ready for a diagnosis: on the load's clock, in shares of full scale, with a model to begin from."""
+"""Recordings prepared for a diagnosis: on the load's clock, in shares of full scale, with a model to start from."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._aligned import Aligned, aligned, as_they_follow
-from smartshoe.diagnosis._baseline import baseline_of, is_turned_over, with_usual_arm
+from smartshoe.diagnosis._aligned import Aligned, aligned, with_lags_removed
+from smartshoe.diagnosis._baseline import baseline_of, has_negative_gain, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._neighbours import with_one_neighbour
@@ -15,7 +15,7 @@ from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import logged_words
 from smartshoe.diagnosis._session import Session, at_full_rate, longest_step_s, prepare
-from smartshoe.diagnosis._slow_stretches import too_slow_of
+from smartshoe.diagnosis._slow_stretches import limit_slow_stretches
 from smartshoe.display import first_names
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
@@ -26,11 +26,11 @@ from smartshoe.recording import Recording
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """``sessions``, thinned for fits, and ``fine``, at full rate; ``start``: the model that fits begin from.
+    """``sessions``, thinned for fits, and ``fine``, at the full rate; ``start`` is the model that fits start from.
 
-    ``limits``: what is said of the data before any fit. ``is_no_unit``: the reading follows something else than a
-    unit's load. ``clocks``: effects, with their values, that put reading and load on one clock; ``is_moved``: readings
-    that are fitted were moved there before, each by itself.
+    ``limits`` are sentences on the data before any fit. ``is_no_unit``: the reading follows something other than the
+    unit's load. ``clocks`` are effects, with values, that put reading and load on one clock. ``is_moved``: fitted
+    readings were shifted there, each by its own lag.
     """
 
     sessions: list[Session]
@@ -46,14 +46,14 @@ class Prepared:
 
 
 def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> Prepared:
-    """Of ``recordings``, of which the first ``count`` are fitted; the others judge."""
+    """The prepared ``recordings``; the first ``count`` are fitted, the others are held out."""
     recordings, said_of_neighbours = with_one_neighbour(recordings, count, integrity.usable, thresholds)
     clocks = aligned(recordings, integrity)
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
     fitted, usable = clocks.recordings[:count], clocks.usable[:count]
-    following = as_they_follow(fitted, usable, None if is_moved else integrity.one_clock)
+    following = with_lags_removed(fitted, usable, None if is_moved else integrity.one_clock)
     scale = full_scale(fitted, usable, thresholds, following)
     held = held_out if any(held_out) else None
     factors = thinning(fitted, scale, thresholds)
@@ -62,20 +62,20 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         replace(one, index=clocks.places[one.index])
         for one in prepare(clocks.recordings, clocks.usable, held, scale, factors, thresholds)
     ]
-    if not clocks.parts and is_turned_over(sessions, thresholds):
+    if not clocks.parts and has_negative_gain(sessions, thresholds):
         sessions = [replace(one, reading=-one.reading) for one in sessions]
         scale = replace(scale, reading=-scale.reading)
     start = baseline_of(sessions, scale)
-    if clocks.parts:  # against a load of another clock no relaxation is found
+    if clocks.parts:  # against the load on another clock no relaxation is found
         start = with_usual_arm(start)
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     excitation = replace(excitation_of(sessions, thresholds), channels=logged_words(sessions))
     ranges = ranges_of(sessions, scale, thresholds)
-    friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
+    friction = [friction_of(recording, thresholds) for recording in following]  # a lag would look like friction
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
     slow = (
-        too_slow_of(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
+        limit_slow_stretches(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
         for one, mask in zip(sessions, clocks.usable, strict=True)
     )
     limits = [
@@ -93,7 +93,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
 
 
 def _first_parts(clocks: Aligned, lengths: Sequence[int]) -> tuple[Aligned, list[str]]:
-    """``clocks`` with so many samples of each of the first recordings, and what is said of the rest."""
+    """``clocks`` with only ``lengths`` samples of the first recordings, and the sentence on the rest."""
     recordings, usable, cut = [*clocks.recordings], [*clocks.usable], []
     for k, length in enumerate(lengths):
         whole = recordings[k]

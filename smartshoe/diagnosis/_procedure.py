@@ -1,4 +1,4 @@
-"""From sound recordings to a diagnosis: baseline, inference, what is left, what it is worth on held-out data."""
+"""From sound recordings to a diagnosis: baseline, inference, residual structure, held-out errors, verdict."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
 from smartshoe.diagnosis._force import (
     Compensation,
-    as_calibrated,
-    clipped_of,
     compensation,
-    force_of,
-    held_of,
-    late_of,
-    not_undone_of,
+    limit_calibration_off,
+    limit_clipped,
+    limit_drift_held,
+    limit_force,
+    limit_latency_left,
+    limit_not_undone,
 )
-from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
-from smartshoe.diagnosis._inference import Inference, inferred
-from smartshoe.diagnosis._lack_of_fit import repeating
+from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_terms_of, residual_of
+from smartshoe.diagnosis._inference import Inference, infer_with_gas_check
+from smartshoe.diagnosis._lack_of_fit import repeating_structure
 from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._limits import (
     SAID,
-    bent_to_the_end_of,
-    elsewhere_of,
-    end_of_range_of,
-    nearest_of,
-    own_gains_of,
-    own_zeros_of,
-    refusals_of,
-    wall_ratio_of,
-    worse_of,
-    zero_changes_said,
+    limit_curve_range,
+    limit_held_out_excess,
+    limit_nearest_law,
+    limit_own_gains,
+    limit_own_zeros,
+    limit_refusals,
+    limit_rejected,
+    limit_relaxation_range,
+    limit_wall_ratio,
+    limit_zero_jumps,
 )
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
-from smartshoe.diagnosis._ranges import beyond
+from smartshoe.diagnosis._ranges import loads_beyond_fit
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
 from smartshoe.diagnosis._scale import Scale
@@ -49,17 +49,17 @@ from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
-    known_error,
-    left_where_judged,
+    fault_rms,
+    held_out_excess,
+    held_out_rms,
     names_in,
-    not_explained_of,
-    not_shown_to_be_noise,
-    off_elsewhere,
     sentence_of,
     unexplained_of,
+    unexplained_remark,
+    untested_rms,
     verdict_of,
 )
-from smartshoe.diagnosis._withheld import Chosen, causes_among
+from smartshoe.diagnosis._withheld import NamedCauses, causes_among
 from smartshoe.diagnosis._zero import OwnZeros, Zero, mean_offset, own_zeros, zeros_of
 from smartshoe.integrity import DataFault, Integrity
 from smartshoe.integrity.thresholds import Thresholds
@@ -74,60 +74,66 @@ from smartshoe.recording import Recording
 def diagnosed(
     recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds, progress: Progress
 ) -> Diagnosis:
-    """What ``recordings`` say of their simulation; the first ``count`` are fitted, the others judge."""
+    """The diagnosis of ``recordings``; the first ``count`` are fitted, the others are held out."""
     given = prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
-    found = inferred(given.start, sessions, thresholds, progress, not given.is_no_unit)
+    found = infer_with_gas_check(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
-    left = _left_by(found, given, integrity.faults)
-    named = _named(found, given, left)
-    held = _held(found.fit.model, named, sessions)
-    if held is not found.fit.model:  # what was fitted, and by what the names go, is as it was
-        found = replace(found, fit=replace(found.fit, model=held))
-        after, _, off_after = _left_of(held, given)
-        left = replace(left, after=after, off_after=off_after)
-    plain = replace(found.baseline.model, noise=fitted_rms(fine, left.off_before))
-    extended = replace(found.fit.model, noise=fitted_rms(fine, left.off_after))
+    structures = _structures_of(found, given, integrity.faults)
+    named = _named_causes(found, given, structures)
+    with_drifts_held = _with_held_drifts(found.fit.model, named, sessions)
+    if with_drifts_held is not found.fit.model:  # the fit, and what the names rest on, stay as they were
+        found = replace(found, fit=replace(found.fit, model=with_drifts_held))
+        after, _, residuals_after = _structure_left_by(with_drifts_held, given)
+        structures = replace(structures, after=after, residuals_after=residuals_after)
+    plain = replace(found.baseline.model, noise=fitted_rms(fine, structures.residuals_before))
+    extended = replace(found.fit.model, noise=fitted_rms(fine, structures.residuals_after))
     baseline, best = errors(fine, plain), errors(fine, extended)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
-    is_told = found.zero_changes or found.own_gains or given.is_no_unit
-    apart = None if is_told else own_zeros(sessions, found.fit.model, thresholds)
-    causes += [zero_cause_of(zero, best, scale, thresholds, apart is None) for zero in named.zeros]
+    skips_own_zeros = found.zero_changes or found.own_gains or given.is_no_unit
+    own_zero_offsets = None if skips_own_zeros else own_zeros(sessions, found.fit.model, thresholds)
+    causes += [zero_cause_of(zero, best, scale, thresholds, own_zero_offsets is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
-    won = gain(baseline, best, scale, thresholds)
-    outcome = _outcome(found, given, left, named, causes, won)
-    adopted = _Adopted(found.fit, extended, best, left.after)
-    if won.is_rejected:  # all that what is held out decides: no extension is adopted that is worse there
-        adopted = _Adopted(found.baseline, plain, baseline, left.before)
-    verdict, rest = outcome.verdict, unexplained_of(causes, left.before, adopted.left)
-    of_held_out = left_where_judged(fine, left.off_after, thresholds)
-    # No more is noise than is no structure, and than what was fitted holds beside its own: what a model does not
-    # foresee elsewhere is none for that. What is white there is noise in any case.
-    structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
-    no_more = min(best.rmse**2 - structure**2, extended.noise**2 - left.within.rms**2)
+    gained = gain(baseline, best, scale, thresholds)
+    outcome = _outcome(found, given, structures, named, causes, gained)
+    adopted = _Adopted(found.fit, extended, best, structures.after)
+    # The only decision that held-out data makes: an extension that is worse there is not adopted.
+    if gained.is_rejected:
+        adopted = _Adopted(found.baseline, plain, baseline, structures.before)
+    verdict, rest = outcome.verdict, unexplained_of(causes, structures.before, adopted.left)
+    of_held_out = held_out_rms(fine, structures.residuals_after, thresholds)
+    # Noise is at most what is not structure, and what fitted data holds besides its structure: what a model fails to
+    # predict is not noise for that. What is white in held-out data is noise in any case.
+    structure = of_held_out if outcome.unproven else min(max(structures.after.rms, outcome.elsewhere), of_held_out)
+    no_more = min(best.rmse**2 - structure**2, extended.noise**2 - structures.within.rms**2)
     noise_variance = max(best.rmse**2 - of_held_out**2, no_more, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
-        fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
+        fine,
+        extended,
+        integrity.faults,
+        explained or structures.after.is_noise,
+        thresholds.material,
+        structures.within.memory,
     )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
     parameters, covariance = joint_parameters(adopted.fit, scale)
     force = compensation(fine, adopted.model, plain, thresholds)
-    # What no compensator takes off, be it the room's warmth, is its zero's, on the mean of the recordings.
+    # What no compensator undoes, for example the room's warmth, goes into its zero, averaged over recordings.
     zeros_apart = abs(force.zero - mean_offset(force.fine, force.model))
     has_own = bool(force.passed_over) or zeros_apart >= thresholds.material
-    of_force = _limits_of_the_force(found, given, named, extended, force, outcome, left, apart)
+    of_force = _limits_of_the_force(found, given, named, extended, force, outcome, structures, own_zero_offsets)
     says = sentence_of(
         verdict,
         names_in(causes, len(minor)),
         baseline,
         best,
-        not_explained_of(rest, 0.0 if won.is_rejected else outcome.elsewhere, outcome.unproven, thresholds),
+        unexplained_remark(rest, 0.0 if gained.is_rejected else outcome.elsewhere, outcome.unproven, thresholds),
         thresholds,
-        worse=won.is_loss,
+        worse=gained.is_loss,
         withheld=_is_silent(found, given)
-        or bool(named.limits or found.zero_changes or found.own_gains or found.nearest),
+        or bool(named.limits or found.zero_changes or found.own_gains or found.nearest_law),
     )
     return Diagnosis(
         verdict,
@@ -138,14 +144,14 @@ def diagnosed(
         causes=tuple(causes),
         minor=minor,
         data_faults=(*integrity.faults, *noise),
-        baseline=_goodness(baseline, force.before.held_out_n, left.before, scale),
+        baseline=_goodness(baseline, force.before.held_out_n, structures.before, scale),
         extended=_goodness(adopted.errors, force.error.held_out_n, adopted.left, scale),
-        gain=None if best.is_empty else won,
+        gain=None if best.is_empty else gained,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(adopted.errors.rmse**2, baseline.rmse**2),
-        rivals=causes[0].rivals if causes else _nearest(found),
+        rivals=causes[0].rivals if causes else _strongest_single_effects(found),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
+            found, causes, sessions, given.excitation, open_=not explained, worse=gained.is_loss
         ),
         limits=(*given.limits, *of_force, *_limits_of_the_names(found, given, named, extended)),
         limits_of_the_force=of_force,
@@ -154,7 +160,7 @@ def diagnosed(
         screening=found.screening,
         likeness=found.likeness,
         model=_with_offset(adopted.model, named.zeros, sessions, scale),
-        rejected=extended if won.is_rejected else None,
+        rejected=extended if gained.is_rejected else None,
         baseline_model=plain,
         force_model=_with_offset(force.model, named.zeros, force.fine, scale, force.undone) if has_own else None,
         parameters=parameters,
@@ -166,7 +172,7 @@ def diagnosed(
 
 @dataclass(frozen=True, eq=False)
 class _Adopted:
-    """The ``model`` that is offered, as it was ``fit``; its held-out ``errors``, and what it has ``left``."""
+    """The ``model`` that is offered, its ``fit``, its held-out ``errors``, and the structure it has ``left``."""
 
     fit: Fit
     model: ExtendedModel
@@ -175,33 +181,37 @@ class _Adopted:
 
 
 @dataclass(frozen=True, eq=False)
-class _LeftOver:
-    """What the plain model leaves ``before`` effects and the extended one ``after``; ``within`` what was fitted.
+class _Structures:
+    """The residual structure of the plain model, ``before`` effects, and of the extended one, ``after``.
 
-    ``known``: rms that faults of the data add to it, a share of full scale. ``off_before`` and ``off_after``: residuals
-    (n,) of each recording at the full rate, since thinning makes noise of neighbours alike.
+    ``within`` is that of fitted data only. ``fault_error`` is the rms that data faults add, a share of full scale.
+    ``residuals_before`` and ``residuals_after`` are the residuals (n,) of each recording at the full rate, since
+    thinning correlates neighbouring noise.
     """
 
     before: ResidualStructure
     after: ResidualStructure
     within: ResidualStructure
-    known: float
-    off_before: Sequence[Array]
-    off_after: Sequence[Array]
+    fault_error: float
+    residuals_before: Sequence[Array]
+    residuals_after: Sequence[Array]
 
 
-def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _LeftOver:
+def _structures_of(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _Structures:
+    """The residual structures of the baseline and of the extended model."""
     sessions = given.sessions
-    before, _, off_before = _left_of(found.baseline.model, given)
-    after, residuals, off_after = _left_of(found.fit.model, given)
-    within = _left_of_what_was_fitted(sessions, residuals, given.thresholds)
-    return _LeftOver(before, after, within, known_error(faults, sessions, given.scale), off_before, off_after)
+    before, _, residuals_before = _structure_left_by(found.baseline.model, given)
+    after, residuals, residuals_after = _structure_left_by(found.fit.model, given)
+    within = _structure_where_fitted(sessions, residuals, given.thresholds)
+    return _Structures(
+        before, after, within, fault_rms(faults, sessions, given.scale), residuals_before, residuals_after
+    )
 
 
-def _left_of(model: ExtendedModel, given: Prepared) -> tuple[ResidualStructure, list[Array], list[Array]]:
-    """What a model leaves: the structure in it, residuals (n,) of each recording, and these at the full rate."""
+def _structure_left_by(model: ExtendedModel, given: Prepared) -> tuple[ResidualStructure, list[Array], list[Array]]:
+    """The structure that a model leaves, and the residuals (n,) of each recording, thinned and at the full rate."""
     residuals, off = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
-    quick = repeating(given.fine, off, given.thresholds)
+    quick = repeating_structure(given.fine, off, given.thresholds)
     return residual_structure(given.sessions, residuals, given.thresholds, quick), residuals, off
 
 
@@ -210,18 +220,18 @@ def _is_silent(found: Inference, given: Prepared) -> bool:
     return given.is_no_unit or not found.can_validate
 
 
-def _named(found: Inference, given: Prepared, left: _LeftOver) -> Chosen:
-    """The causes in what was ``found``."""
-    most = max(left.within.rms, left.within.size)
-    wanders = left.within.wanders(given.thresholds.hold_s)
-    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, wanders)
+def _named_causes(found: Inference, given: Prepared, structures: _Structures) -> NamedCauses:
+    """The causes among what was ``found``."""
+    most = max(structures.within.rms, structures.within.size)
+    residual_sd = structures.within.sd_of_mean(given.thresholds.hold_s)
+    zeros = [] if _is_silent(found, given) else _material_zeros(found, given, most, residual_sd)
     return causes_among(found, given, zeros, most)
 
 
-def _held(model: ExtendedModel, named: Chosen, sessions: Sequence[Session]) -> ExtendedModel:
-    """``model`` with drifts that are no ``named`` law held from the end of what was fitted on: beyond it nothing tells.
+def _with_held_drifts(model: ExtendedModel, named: NamedCauses, sessions: Sequence[Session]) -> ExtendedModel:
+    """``model`` with drifts held from the end of the fitted data on, unless a law is ``named`` for them.
 
-    A free form is none either, whatever its kind is named.
+    Nothing tells how such a drift goes on. A flexible block is held too, whatever its kind is named.
     """
     fitted = ((one.conditions, one.conditions.time_s[one.fitted]) for one in fitted_of(sessions))
     ends_s = max(at.before.get("time_s", 0.0) + float(time_s[-1]) for at, time_s in fitted)
@@ -230,13 +240,13 @@ def _held(model: ExtendedModel, named: Chosen, sessions: Sequence[Session]) -> E
 
 @dataclass(frozen=True, slots=True)
 class _Outcome:
-    """The verdict, by what was ``won``, what is ``elsewhere`` (`off_elsewhere`) and ``unproven``.
+    """The verdict and its grounds.
 
-    ``unproven`` is that of `not_shown_to_be_noise`.
+    ``gained``: on held-out data; ``elsewhere``: the `held_out_excess`; ``unproven``: the `untested_rms`.
     """
 
     verdict: Verdict
-    won: Gain
+    gained: Gain
     elsewhere: float
     unproven: float
 
@@ -244,98 +254,113 @@ class _Outcome:
 def _outcome(
     found: Inference,
     given: Prepared,
-    left: _LeftOver,
-    named: Chosen,
+    structures: _Structures,
+    named: NamedCauses,
     causes: Sequence[Cause],
-    won: Gain,
+    gained: Gain,
 ) -> _Outcome:
-    """The verdict, by what is ``left``, and ``won`` on what is held out."""
-    fine, off, known, thresholds = given.fine, left.off_after, left.known, given.thresholds
-    within = max(left.within.size, beyond_noise(fine, off, thresholds), known)
-    elsewhere = off_elsewhere(fine, off, within, thresholds)
+    """The verdict, from the structures ``structures`` and what is ``gained`` on held-out data."""
+    fine, off, fault_error, thresholds = (
+        given.fine,
+        structures.residuals_after,
+        structures.fault_error,
+        given.thresholds,
+    )
+    within = max(structures.within.size, beyond_noise(fine, off, thresholds), fault_error)
+    elsewhere = held_out_excess(fine, off, within, thresholds)
     unproven = 0.0
-    if not (found.can_validate and left.after.is_tested):
-        # Beside causes what is left is weighed against what was wrong, tested or not.
-        before = left.off_before if found.can_validate and causes else None
-        unproven = not_shown_to_be_noise(fine, off, left.after, thresholds, known, before)
-    if given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
-        return _Outcome("unexplained", won, elsewhere, unproven)
-    # An unsure companion of one that is sure does not say that laws are none.
-    follows = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
-    # What the model follows is there, even if it is of no kind with a name, or too little is left to be tested.
-    least = max(thresholds.tolerable, thresholds.material, known)
-    gained = 0.0 if causes else won.certain_fall(given.scale)
-    besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
-    worse = won.is_loss or won.growth(given.scale) > thresholds.tolerable
-    verdict = verdict_of(causes, left.before, left.after, thresholds, follows, known, worse=worse, elsewhere=besides)
-    return _Outcome(verdict, won, elsewhere, unproven)
+    if not (found.can_validate and structures.after.is_tested):
+        # Beside causes the remainder is compared with what was wrong, tested or not.
+        before = structures.residuals_before if found.can_validate and causes else None
+        unproven = untested_rms(fine, off, structures.after, thresholds, fault_error, before)
+    if given.is_no_unit:  # a reading that follows something other than the load is no unit's, however well it fits
+        return _Outcome("unexplained", gained, elsewhere, unproven)
+    # An unsure companion of a sure cause does not mean that there is no law.
+    is_lawful = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
+    # What the model follows is real, even without a name, or with too little left to be tested.
+    least = max(thresholds.tolerable, thresholds.material, fault_error)
+    certain_fall = 0.0 if causes else gained.certain_fall(given.scale)
+    besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, certain_fall) if one > least))
+    worse = gained.is_loss or gained.growth(given.scale) > thresholds.tolerable
+    verdict = verdict_of(
+        causes, structures.before, structures.after, thresholds, is_lawful, fault_error, worse=worse, elsewhere=besides
+    )
+    return _Outcome(verdict, gained, elsewhere, unproven)
 
 
 def _limits_of_the_force(
     found: Inference,
     given: Prepared,
-    named: Chosen,
+    named: NamedCauses,
     extended: ExtendedModel,
     force: Compensation,
     outcome: _Outcome,
-    left: _LeftOver,
-    apart: OwnZeros | None,
+    structures: _Structures,
+    own_zero_offsets: OwnZeros | None,
 ) -> tuple[str, ...]:
-    """What limits the force that a calibration gives: loads beyond those fitted, what is not undone, zeros, gains."""
-    won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
-    ways = beyond(given.sessions, given.scale, thresholds) if won.is_rejected or elsewhere else None
+    """What limits a calibration's force: loads beyond the fitted ones, effects that are not undone, zeros, gains."""
+    gained, elsewhere, thresholds = outcome.gained, outcome.elsewhere, given.thresholds
+    ways = loads_beyond_fit(given.sessions, given.scale, thresholds) if gained.is_rejected or elsewhere else None
     undone = extended if force.is_plain else force.model
     return (
-        *([worse_of(won, ways)] if won.is_rejected else []),
-        *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_rejected else []),
-        *force_of(force),
-        *clipped_of(force),
-        *late_of(force),
-        *([] if won.is_rejected else not_undone_of(undone, given.fine[0].conditions.step_s)),
-        *([] if force.is_plain else held_of(force, thresholds)),
-        *named.of_zeros,
-        *own_gains_of(found.own_gains),
-        *own_zeros_of(apart, given.scale),
-        *as_calibrated(force, thresholds),
-        *zero_changes_said(found.zero_changes),
+        *([limit_rejected(gained, ways)] if gained.is_rejected else []),
+        *(
+            [limit_held_out_excess(elsewhere, structures.within.size, ways)]
+            if elsewhere and not gained.is_rejected
+            else []
+        ),
+        *limit_force(force),
+        *limit_clipped(force),
+        *limit_latency_left(force),
+        *([] if gained.is_rejected else limit_not_undone(undone, given.fine[0].conditions.step_s)),
+        *([] if force.is_plain else limit_drift_held(force, thresholds)),
+        *named.zero_limits,
+        *limit_own_gains(found.own_gains),
+        *limit_own_zeros(own_zero_offsets, given.scale),
+        *limit_calibration_off(force, thresholds),
+        *limit_zero_jumps(found.zero_changes),
     )
 
 
-def _limits_of_the_names(found: Inference, given: Prepared, named: Chosen, extended: ExtendedModel) -> tuple[str, ...]:
-    """What limits the names: causes that are none, models at their ends, what was refused."""
+def _limits_of_the_names(
+    found: Inference, given: Prepared, named: NamedCauses, extended: ExtendedModel
+) -> tuple[str, ...]:
+    """What limits the names: effects that are no causes, models at the end of their range, refused effects."""
     of_model = (
-        end_of_range_of(extended, given.sessions, given.thresholds),
-        bent_to_the_end_of(extended, named.names),
-        wall_ratio_of(extended, given.sessions, given.thresholds),
+        limit_relaxation_range(extended, given.sessions, given.thresholds),
+        limit_curve_range(extended, named.names),
+        limit_wall_ratio(extended, given.sessions, given.thresholds),
     )
-    near = nearest_of(found, given.thresholds)
-    return (*named.limits, *(said for said in of_model if said is not None), *near, *refusals_of(found))
+    near = limit_nearest_law(found, given.thresholds)
+    return (*named.limits, *(said for said in of_model if said is not None), *near, *limit_refusals(found))
 
 
-def _left_of_what_was_fitted(
+def _structure_where_fitted(
     sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
 ) -> ResidualStructure:
-    """What is left where a model was fitted: what is held out decides over no name, and may be of other loads."""
+    """The structure left in fitted samples: held-out data decides no name, and may hold other loads."""
     learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
     learnt = [(one, left) for one, left in learnt if one.usable.any()]
     return residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
 
 
-def _nearest(found: Inference) -> tuple[Rival, ...]:
-    """The few effects that take most off by themselves; flexible blocks are none."""
+def _strongest_single_effects(found: Inference) -> tuple[Rival, ...]:
+    """The few single effects that explain most, without flexible blocks, where no cause is named."""
     return tuple([Rival(name, fall, "alone") for name, fall in found.screening if name in catalogue()][:SAID])
 
 
-def _zeros(found: Inference, given: Prepared, left: float, wanders: float) -> list[Zero]:
-    """The offsets and tares that are seen beside what was ``found``, and are material."""
+def _material_zeros(found: Inference, given: Prepared, left: float, residual_sd: float) -> list[Zero]:
+    """The material offsets and tares that are seen together with what was ``found``."""
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
-    rubbed = math.hypot(*(one.size for one in found.members if one.effect.never_fades))
-    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, wanders, rubbed)
+    lasting_memory = math.hypot(*(one.size for one in found.members if one.effect.never_fades))
+    zeros = zeros_of(
+        given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, residual_sd, lasting_memory
+    )
     return [one for one in zeros if one.size >= given.thresholds.material]
 
 
 def _percent_less(after: float, before: float) -> float:
-    """By how many percent a variance falls, 0 where it grows, NaN where nothing was judged."""
+    """By how many percent a variance falls; 0 where it grows, NaN where nothing was judged."""
     if math.isnan(before):
         return before
     return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
@@ -348,10 +373,10 @@ def _with_offset(
     scale: Scale,
     undone: ExtendedModel | None = None,
 ) -> ExtendedModel:
-    """``model`` with the recordings' mean offset, so that it gives readings as they are logged.
+    """``model`` with the recordings' mean offset, so that it gives readings as logged.
 
-    Also where one is named: at the rest that shows it the ``model`` may be off by some of what it misses elsewhere.
-    Where it is to be ``undone`` in part, the offset beside that part.
+    Also where an offset is named, since the model may be off at the rest that shows it. With ``undone``, the part of
+    the model that is undone, the offset is that with this part only.
     """
     tares = [(zero.effect, np.array([zero.value])) for zero in zeros if zero.effect.shifts == "load"]
     of = undone or model
@@ -360,10 +385,11 @@ def _with_offset(
     offset = mean_offset(sessions, of) + scale.zero / scale.reading
     if offset == 0.0:
         return model
-    return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the chain's end multiplies it
+    return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the gain is applied last
 
 
 def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:
+    """A model's goodness of fit in the reading's unit; None where nothing was judged."""
     if found.is_empty:
         return None
     span = abs(scale.reading)
@@ -378,12 +404,14 @@ def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Sca
 
 
 def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, scale: Scale) -> Trace:
+    """A recording with both simulations, own terms included, in the reading's unit and N."""
+
     def told(shares: Array) -> Array:
         return np.asarray(scale.zero + shares * scale.reading)
 
     def simulated(model: ExtendedModel) -> Array:
         plain = model.simulate(session.conditions)
-        return told(plain + own_of(session, model, session.reading - plain)[1])
+        return told(plain + own_terms_of(session, model, session.reading - plain)[1])
 
     return Trace(
         session.recording.name,

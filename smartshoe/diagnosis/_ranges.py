@@ -1,4 +1,4 @@
-"""What the range of the load allows: a gain seen over a narrow range, or within files only, is a trap."""
+"""What the range of the load allows: a gain seen over a narrow range, or only within files, is a trap."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.exposure import LATER_CYCLES, SAYS
 
-GROUPS = 100  # of samples of like loads, at most: a resolution
+GROUPS = 100  # the largest number of groups of similar loads: a resolution
 
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """Sentences, and whether the gain is a trap: no name can be trusted then."""
+    """Sentences on the range, and whether the gain is a trap, so that no name can be trusted."""
 
     says: tuple[str, ...] = ()
     is_trap: bool = False
 
 
 def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> Ranges:
-    """A sentence for each thing that the range of the fitted loads does not allow to be said."""
+    """A sentence for each thing that the range of the fitted loads does not support."""
     said: list[str] = []
-    fitted = [one for one in sessions if _tells(one.fitted)]
+    fitted = [one for one in sessions if _has_enough(one.fitted)]
     if not fitted:
         return Ranges()
-    kept = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
+    pairs = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
     trap = False
     unit = scale.unit.symbol
     to_physical = scale.reading / scale.load_n
-    within = [_gain(load, reading, thresholds.follows) for load, reading in kept]
-    is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in kept)
+    within = [_gain(load, reading, thresholds.follows) for load, reading in pairs]
+    is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in pairs)
     if is_narrow and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
-        through_zero = float(np.median([reading.mean() / load.mean() for load, reading in kept]))
-        lowest = min(range(len(kept)), key=lambda k: float(kept[k][0].min()))
-        low, high = (float(of(kept[lowest][0])) * scale.load_n for of in (np.min, np.max))
-        is_gauge = scale.unit.quantity == "pressure"  # the zero of others is a convention, through which no line goes
+        through_zero = float(np.median([reading.mean() / load.mean() for load, reading in pairs]))
+        lowest = min(range(len(pairs)), key=lambda k: float(pairs[k][0].min()))
+        low, high = (float(of(pairs[lowest][0])) * scale.load_n for of in (np.min, np.max))
+        is_gauge = scale.unit.quantity == "pressure"  # for others zero is a convention
         trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
@@ -56,7 +56,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 else ": what lies below is extrapolated"
             )
         )
-    low, high = min(float(load.min()) for load, _ in kept), max(float(load.max()) for load, _ in kept)
+    low, high = min(float(load.min()) for load, _ in pairs), max(float(load.max()) for load, _ in pairs)
     if thresholds.clear * low > high and not any(within):
         trap = True
         said.append(
@@ -64,16 +64,16 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             " reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load it"
             " over its range)"
         )
-    said += _flat_above(kept, scale, thresholds)
-    judged = [one for one in sessions if not _tells(one.fitted) and _tells(one.judged)]
+    said += _limit_flat_reading(pairs, scale, thresholds)
+    judged = [one for one in sessions if not _has_enough(one.fitted) and _has_enough(one.judged)]
     beside = [_gain(one.conditions.load[one.judged], one.reading[one.judged], thresholds.follows) for one in judged]
     named = [one.recording.name for one in (*fitted, *judged)]
-    said += _foreign(list(zip(named, (*within, *beside), strict=True)), thresholds)
-    said += _unlike(fitted, thresholds)
-    between = _between(kept, thresholds.same)
+    said += _limit_foreign_gain(list(zip(named, (*within, *beside), strict=True)), thresholds)
+    said += _limit_unlike_gain(fitted, thresholds)
+    between = _gain_between_files(pairs, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
         gains = [gain for gain in within if gain is not None]
-        # A chord of a curve is as steep as the curve somewhere on its way.
+        # Somewhere on its way a curve is as steep as its chord.
         over = [abs(gain / between) for gain in gains]
         if min(over) >= 1.0 + thresholds.same or max(over) * (1.0 + thresholds.same) <= 1.0:
             trap = trap or is_narrow
@@ -85,18 +85,18 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     return Ranges(tuple(said), trap)
 
 
-def _tells(seen: Mask) -> bool:
-    """Whether enough of a recording is ``seen`` (n,) to tell a gain."""
+def _has_enough(seen: Mask) -> bool:
+    """Whether enough samples of a recording are ``seen`` (n,) for a gain."""
     return int(seen.sum()) > 10
 
 
-def _flat_above(kept: Sequence[tuple[Array, Array]], scale: Scale, thresholds: Thresholds) -> list[str]:
-    """What is said of a reading that stands still over the upper loads: a stop, on which noise or sums move it.
+def _limit_flat_reading(pairs: Sequence[tuple[Array, Array]], scale: Scale, thresholds: Thresholds) -> list[str]:
+    """The sentence on a reading that stands still over the upper loads, as at a mechanical stop.
 
-    Of the recording that reaches highest: medians of the reading over the upper quarter (`same`) of its loads, or more,
+    In the recording of the highest load, medians of the reading over the upper share `same` of its loads, or more,
     differ from the last by less than `standing` of its span.
     """
-    load, reading = max(kept, key=lambda one: float(one[0].max()))
+    load, reading = max(pairs, key=lambda one: float(one[0].max()))
     order = np.argsort(load)
     groups = np.array_split(order, max(1, min(order.size // thresholds.few, GROUPS)))
     levels = np.array([float(np.median(reading[group])) for group in groups])
@@ -111,10 +111,10 @@ def _flat_above(kept: Sequence[tuple[Array, Array]], scale: Scale, thresholds: T
     ]
 
 
-def _foreign(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) -> list[str]:
-    """What is said of files that read many times what the first one does, or the other way, under the same load."""
+def _limit_foreign_gain(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) -> list[str]:
+    """Sentences on files whose gain is many times that of the first, or of the other sign."""
     known = [(name, gain) for name, gain in gains if gain]
-    most = thresholds.clear**2  # twice over what differs for certain
+    most = thresholds.clear**2  # the square of a clear difference
     if not known:
         return []
     first, usual = known[0]
@@ -126,17 +126,17 @@ def _foreign(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) 
     ]
 
 
-def _unlike(sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
-    """What is said of files that read more or less than the first one by more than gains that are alike differ by.
+def _limit_unlike_gain(sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
+    """Sentences on files whose gain differs from that of the first by more than equal gains do.
 
-    Over loads that both have, where these go as high and as fast: neither a curve nor a rate does it. What reads many
-    times as much is told by `_foreign`.
+    Compared over loads that both have, and only where these are as high and as fast, so that neither a curve nor a rate
+    explains it. Far larger ratios are left to `_limit_foreign_gain`.
     """
     first, *others = sessions
     name = first.recording.name
     said = []
     for one in others:
-        # All that was recorded says how a load goes, be it held out.
+        # All recorded loads count here, held out or not.
         if not all(_near(of(first, first.usable), of(one, one.usable), thresholds.same) for of in (_fastest, _highest)):
             continue
         most = min(_highest(file, file.fitted) for file in (first, one))
@@ -158,17 +158,19 @@ def _near(one: float, other: float, same: float) -> bool:
 
 
 def _fastest(one: Session, seen: Mask) -> float:
+    """The fastest rate (99th percentile) of a session's load where ``seen``, full scales per second."""
     return float(np.quantile(np.abs(one.conditions.rate_per_s[seen]), 0.99))
 
 
 def _highest(one: Session, seen: Mask) -> float:
+    """The highest load of a session where ``seen``, in full scales."""
     return float(one.conditions.load[seen].max())
 
 
-def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> str | None:
-    """How the loads that are held out go beyond what was fitted: faster, higher or longer, or by what these lack.
+def loads_beyond_fit(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> str | None:
+    """How held-out loads exceed the fitted ones: faster, higher or longer, or of a kind that these lack; else None.
 
-    ``same`` apart, as rates and peaks of one kind may be. None where they do not.
+    They exceed them if they differ by more than ``same``.
     """
     fitted = [(one, one.fitted) for one in sessions if one.fitted.any()]
     judged = [(one, one.judged) for one in sessions if one.judged.any()]
@@ -193,12 +195,12 @@ def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) ->
 
 
 def rounded(value: float) -> str:
-    """A number to three digits, as a person writes it."""
+    """A number with three digits and thousands separators."""
     return f"{float(f'{value:.3g}'):,g}"
 
 
 def _gain(load: Array, reading: Array, follows: float) -> float | None:
-    """Slope of reading on load within a file, None where load explains less of its variance than ``follows``."""
+    """Slope of the reading on the load of a file; None where it explains less of the variance than ``follows``."""
     if not load.size:
         return None
     a, b = load - load.mean(), reading - reading.mean()
@@ -206,12 +208,12 @@ def _gain(load: Array, reading: Array, follows: float) -> float | None:
     return float(a @ b / (a @ a)) if size > 0 and float(a @ b) ** 2 > follows * size**2 else None
 
 
-def _between(kept: Sequence[tuple[Array, Array]], apart: float) -> float | None:
-    """Slope of the files' mean readings on their mean loads, None where these are not ``apart`` (full scales)."""
-    if len(kept) < 2:
+def _gain_between_files(pairs: Sequence[tuple[Array, Array]], apart: float) -> float | None:
+    """Slope of the files' mean readings on their mean loads; None where these lie within ``apart`` full scales."""
+    if len(pairs) < 2:
         return None
-    loads = np.array([load.mean() for load, _ in kept])
-    readings = np.array([reading.mean() for _, reading in kept])
+    loads = np.array([load.mean() for load, _ in pairs])
+    readings = np.array([reading.mean() for _, reading in pairs])
     if np.ptp(loads) < apart:
         return None
     a = loads - loads.mean()

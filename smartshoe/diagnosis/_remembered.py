@@ -1,4 +1,4 @@
-"""Drifts of the zero that may be what a unit still remembers of loads before recordings that begin loaded."""
+"""Drifts of the zero that may be a memory of loads before the recording, where recordings begin loaded."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ from smartshoe.models.extended import ExtendedModel
 
 
 def may_be_remembered(drift: Name, model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> bool:
-    """Whether the arms of a model's effects, in any state as recordings begin, stand for a ``drift`` of the zero in it.
+    """Whether the arms of the model's effects, started in any state, can replace a ``drift`` of the zero.
 
-    A model's arms begin as the first load would hold them; of a unit that begins loaded nothing tells for how long it
-    has been. Only the baseline's arm may begin in another state, for each model alike, so that what another arm
-    remembers has no place but a drift. It stands for one where it misses no more of it than laws depart by, all else
-    following.
+    A model's arms start in equilibrium with the first load, but nothing tells how long a unit that begins loaded has
+    been loaded. Only the baseline's arm has a free initial state, so that the memory of another arm can only appear as
+    a drift. The arms can replace it if they, with all else refitted, miss no more of it than laws usually depart.
     """
     if not (drift.effect.is_drift and drift.effect.is_seen_at_rest):
         return False
@@ -35,19 +34,22 @@ def may_be_remembered(drift: Name, model: ExtendedModel, sessions: Sequence[Sess
     if not arms:
         return False
     fitted = fitted_of(sessions)
-    whole, without = (
+    cost, cost_without = (
         sum(float(np.sum(residual_of(one, each)[one.fitted] ** 2)) for one in fitted)
         for each in (model, drift.member.without.model)
     )
-    gram = np.sum([_gram_beside(arms, one, bare, without) for one in fitted], axis=0)
-    beside = float(gram[0, 0] - gram[0, 1:] @ np.linalg.pinv(gram[1:, 1:], rcond=1e-10, hermitian=True) @ gram[1:, 0])
-    return beside - whole <= thresholds.departure**2 * (without - whole)
+    gram = np.sum([_gram_without_own_terms(arms, one, bare, cost_without) for one in fitted], axis=0)
+    cost_with_arms = float(
+        gram[0, 0] - gram[0, 1:] @ np.linalg.pinv(gram[1:, 1:], rcond=1e-10, hermitian=True) @ gram[1:, 0]
+    )
+    return cost_with_arms - cost <= thresholds.departure**2 * (cost_without - cost)
 
 
-def _gram_beside(arms: Sequence[Arm], session: Session, model: ExtendedModel, squares: float) -> Array:
-    """(1 + p, 1 + p) inner products of what ``model`` leaves and its slopes, beside the session's own and the arms.
+def _gram_without_own_terms(arms: Sequence[Arm], session: Session, model: ExtendedModel, squares: float) -> Array:
+    """(1 + p, 1 + p) inner products of the residual and slopes of ``model``, own terms and arm states projected out.
 
-    These may begin, where the session begins loaded, in a state that is off by as much as its first load makes.
+    Where the session begins loaded the state of each arm may be off by as much as its first load causes. ``squares`` is
+    the residual's sum of squares, for the noise variance.
     """
     load, seen = abs(float(session.conditions.load[0])), session.fitted
     time_s = session.conditions.time_s - session.conditions.time_s[0]

@@ -1,4 +1,4 @@
-"""What is left over, in a sentence: how large, whether it is more than noise, and where it sits."""
+"""The structure of a residual in a sentence: how large, whether it is more than noise, and where it lies."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._denoise import noise_sd
-from smartshoe.diagnosis._excitation import stays
+from smartshoe.diagnosis._excitation import stays_still
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
-from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, slow
+from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating_structure, slow_structure
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualStructure:
-    """``rms`` of the structure in a residual (shares of full scale), by two tests of lack of fit.
+    """The structure of a residual, shares of full scale, by two tests of lack of fit.
 
-    ``says`` where it is largest. ``memory`` is what its slow part is made of: where that is noise, it is no structure,
-    however slow. ``size`` is all that is beyond white noise.
+    ``repeating`` and ``slow`` are the tests. ``memory`` describes the slow part: where it is noise it is no structure,
+    however slow. ``says`` where the structure is largest. ``size`` is all that exceeds white noise.
     """
 
     repeating: LackOfFit
@@ -33,19 +33,19 @@ class ResidualStructure:
 
     @property
     def rms(self) -> float:
-        """The largest of the tests that stand out of the noise, 0 where none does."""
-        return max(self._found, default=0.0)
+        """The largest rms of the significant tests, 0 where none is."""
+        return max(self._significant_rms, default=0.0)
 
     @property
     def significant(self) -> bool:
-        """Whether any test stands out of the noise."""
-        return bool(self._found)
+        """Whether any test is significant."""
+        return bool(self._significant_rms)
 
     @property
     def how(self) -> str:
-        """What the largest part does: it repeats with the load's cycles, or it changes slowly, whatever these do.
+        """How the largest part behaves, for a sentence.
 
-        What has a memory alone, as what swings within a second, does neither.
+        It repeats with the load cycles, it changes slowly, or it is correlated only over short times.
         """
         if self.repeating.significant and self.repeating.rms >= self.rms:
             return "repeats"
@@ -56,29 +56,31 @@ class ResidualStructure:
         """Whether nothing is left but noise, slow or not."""
         return self.memory is not None and self.memory.is_noise and not self.significant
 
-    def wanders(self, duration_s: float) -> float:
-        """Standard deviation of its mean over ``duration_s`` wherever that lies: of noise, and of what changes slowly.
+    def sd_of_mean(self, duration_s: float) -> float:
+        """Standard deviation of the residual's mean over ``duration_s`` at any place: of noise, or of slow changes.
 
-        What repeats with the load's cycles has its places in them.
+        Structure that repeats with the load cycles is not counted, since its place in them is known.
         """
         if self.memory is not None and self.memory.is_noise:
-            return self.memory.of_a_mean(duration_s)
+            return self.memory.sd_of_mean(duration_s)
         return self.slow.rms if self.how == "changes slowly" else 0.0
 
     @property
     def is_tested(self) -> bool:
-        """Whether a test would have shown all that is beyond white noise: else finding none says nothing.
+        """Whether a test would have detected all that exceeds white noise; else finding none proves nothing.
 
-        What does not repeat may be structure even so: that it repeats not is no such test.
+        The test of repetition does not count, since structure need not repeat.
         """
-        return self.memory is not None or self.slow.would_show(self.size)
+        return self.memory is not None or self.slow.would_detect(self.size)
 
     @property
-    def _found(self) -> list[float]:
+    def _significant_rms(self) -> list[float]:
+        """The rms of each significant test, shares of full scale."""
         if self.memory is not None and self.memory.is_noise:
             return [self.repeating.rms] if self.repeating.significant else []
         found = [one.rms for one in (self.repeating, self.slow) if one.significant]
-        # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
+        # A correlated part that at least one test shows to be no stationary noise is structure, even if it does not
+        # repeat.
         remembered = min(self.memory.beyond_noise, self.size) if self.memory is not None else 0.0
         return [*found, remembered] if remembered > 0.0 else found
 
@@ -86,20 +88,21 @@ class ResidualStructure:
 def residual_structure(
     sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds, quick: LackOfFit | None = None
 ) -> ResidualStructure:
-    """Both tests of the residuals, and the place of the largest part.
+    """Both tests of the ``residuals``, (n,) for each session, and the place of the largest part.
 
-    ``quick`` is the first at the full rate: what swings faster than the fastest ramp asks is averaged out of a fit.
+    ``quick`` is the test of repetition at the full rate: thinning averages out what swings faster than the fastest
+    ramp.
     """
     memory = gauss_markov_of(sessions, residuals, thresholds)
     says = worst_place(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
-    repeats = repeating(sessions, residuals, thresholds)
+    repeats = repeating_structure(sessions, residuals, thresholds)
     if quick is not None and quick.significant and quick.rms > repeats.rms:
         repeats = quick
     return ResidualStructure(
         repeats,
-        slow(sessions, residuals, thresholds),
+        slow_structure(sessions, residuals, thresholds),
         memory,
         says,
         beyond_noise(sessions, residuals, thresholds),
@@ -107,7 +110,7 @@ def residual_structure(
 
 
 def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:
-    """Rms of ``residuals``, (n,) a session, over what is fitted beyond white noise, whether it repeats or not."""
+    """Rms of ``residuals``, (n,) for each session, over fitted samples, beyond white noise."""
     square, white, count = 0.0, 0.0, 0
     for session, whole in zip(sessions, residuals, strict=True):
         if session.fitted.any():
@@ -119,14 +122,14 @@ def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array], thresh
 
 
 def worst_place(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> str:
-    """The bin of load and direction, and the stretch of the file's time, that hold most of the residual's slow part."""
+    """A sentence on where the slow part of the residual is largest: load and direction, recording and time."""
     load, rate, stay, error, names = [], [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
         width = min(max(1, round(0.5 / session.conditions.step_s)), residual.size)
         smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
         load.append(session.conditions.load)
         rate.append(session.conditions.rate_per_s)
-        stay.append(stays(session, thresholds))
+        stay.append(stays_still(session, thresholds))
         error.append(smooth)
         names += [index] * residual.size
     loads, rates, errors = (np.concatenate(x) for x in (load, rate, error))

@@ -1,4 +1,4 @@
-"""`Diagnosis`: what was found, as an object and as the contract's JSON."""
+"""`Diagnosis`: the result of a diagnosis, as an object and as the contract's JSON."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
 
 Verdict = Literal["adequate", "explained", "partly_explained", "unexplained", "refused"]
-# Statistics whose statements say why a cause, or its law, is not sure.
+# The statistics of statements that say why a cause, or its law, is not sure.
 OF_A_DOUBTED_CAUSE, OF_A_KIND = "confidence of its kind", "kind"
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """One piece of evidence: a number, what it is held against, and a sentence."""
+    """One piece of evidence: a number, the threshold it is compared with, and a sentence."""
 
     statistic: str
     value: float
@@ -51,10 +51,11 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another effect that came near: ``margin`` is by how much less likely it is, in -2 log; likelier where below zero.
+    """Another effect in a cause's place, whose -2 log probability is higher by ``margin``, lower if that is negative.
 
-    ``by``: of a law of the same kind in its place, the likelihood of a ``fit``; of another kind, the ``evidence``, in
-    which equations may be inexact. The two are not on one scale. Where no cause is named, what it ``alone`` takes off.
+    ``by``: for a law of the same kind, the likelihood of a ``fit`` in its place; for another kind, the ``evidence``, in
+    which equations may be inexact. The two are not on one scale. Where no cause is named, ``alone``: what it explains
+    by itself.
     """
 
     effect: str
@@ -63,12 +64,12 @@ class Rival:
 
     @property
     def may_be_likelier(self) -> bool:
-        """Whether it is as likely or likelier in the place of what is named, to the nearest whole number."""
+        """Whether it is at least as probable as the named effect, to the nearest whole number."""
         return self.margin < 0.5
 
     @property
     def says(self) -> str:
-        """How likely it is in the place of what is named: "is less likely by 12"; of a fit, how much worse it fits."""
+        """How probable it is in the cause's place, as "is less likely by 12"; for a fit, how much worse it fits."""
         size, of_fit = abs(self.margin), self.by == "fit"
         if size < 0.5:
             return "fits as well" if of_fit else "is as likely"
@@ -83,17 +84,18 @@ class Rival:
 
 
 def likelier_of(rivals: Sequence[Rival], equivalents: Sequence[str]) -> tuple[Rival, ...]:
-    """Those that alone in a cause's place would be as likely or likelier, beside what cannot be ruled out."""
+    """The rivals that are at least as probable in a cause's place and are none of its ``equivalents``."""
     return tuple(one for one in rivals if one.may_be_likelier and one.effect not in equivalents)
 
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale.
+    """One named effect. ``size`` is the rms by which it moves the reading, a share of full scale.
 
-    ``confidence`` that it is this effect or one of its ``equivalents``, which this data cannot tell from it;
-    ``law_confidence`` that, if so, it is this one and not its nearest rival: one half in a dead heat. ``part``: the
-    effect of the fitted model that it is, itself or the flexible block that stands for it; None of an offset at rest.
+    ``confidence`` is the probability that it is this effect or one of its ``equivalents``, which this data cannot
+    distinguish; ``law_confidence`` that, if so, it is this one and not its nearest rival, one half in a dead heat.
+    ``part`` names the effect of the fitted model that it is, itself or a flexible block in its place; None for an
+    offset or tare at rest.
     """
 
     effect: Effect
@@ -114,12 +116,12 @@ class Cause:
 
     @property
     def as_likely(self) -> tuple[Rival, ...]:
-        """The rivals that alone in its place would be as likely or likelier, though nothing else says so."""
+        """The rivals that are at least as probable in its place, although nothing else supports them."""
         return likelier_of(self.rivals, self.equivalents)
 
     @property
     def doubt(self) -> str:
-        """Why it is not sure, or its law is not, as its evidence says; empty where nothing does."""
+        """Why it, or its law, is not sure, from its evidence; empty where it is sure."""
         return next((one.says for one in self.evidence if one.statistic in (OF_A_DOUBTED_CAUSE, OF_A_KIND)), "")
 
     def to_dict(self) -> dict[str, Any]:
@@ -144,9 +146,9 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
-    """How a model does on held-out data; ``structure_rms`` is what its residual of all recordings holds beside noise.
+    """How a model does on held-out data; ``structure_rms`` is the structure in its residual of all recordings.
 
-    NaN where nothing could be judged, ``structure_rms`` where no test could have shown any.
+    NaN where nothing could be judged; ``structure_rms`` is NaN where no test could have detected any.
     """
 
     rmse: float
@@ -169,7 +171,7 @@ class GoodnessOfFit:
 
 @dataclass(frozen=True, slots=True)
 class NextExperiment:
-    """What would separate the rivals: a protocol to run (with its expected margin), or a channel to log."""
+    """What would separate the rivals: a protocol to run, with its expected margin, or a channel to log."""
 
     separates: tuple[str, ...]
     protocol: str | None
@@ -193,7 +195,7 @@ class NextExperiment:
 class Trace:
     """One recording at its full rate, for figures: all (n,), reading in ``Diagnosis.unit``, load in N.
 
-    ``recording`` is its index among all that were given, as that of a `DataFault`.
+    ``recording`` is its index among all that were given, as in a `DataFault`.
     """
 
     name: str
@@ -210,20 +212,22 @@ class Trace:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Summarised):
-    """What measured data says of its simulation; `to_dict` is what `smartshoe diagnose --json` writes.
+    """The result of a diagnosis; `to_dict` is what `smartshoe diagnose --json` writes.
 
-    ``limits_of_the_force``: those of ``limits`` that say where the force of a calibration may be off; ``clipped``: the
-    share of samples that errors of the force leave out.
-    ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
-    ``rejected``: the extended model that what was fitted speaks for, where ``gain`` tells that it is worse on what is
-    held out; ``model``, ``extended`` and ``parameters`` are the plain one's then. None where it is not worse.
-    ``force_model`` is the plain one, each with its zero, where its inverse gives the load back and that of ``model``
-    does not; None where that does. ``extended.force_rmse_n`` is of the one that `calibration` compensates by.
-    ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
-    ``left_out``: which recordings were, and why, as ``limits`` begin with it.
-    ``minor``: effects that stay in the model and are no causes: immaterial, unsure, undone by others, at a bound.
-    ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
-    ``effect.parameter``, with their ``covariance``.
+    ``model`` is the extended model and ``baseline_model`` the plain one, None if the diagnosis was refused.
+    ``rejected`` is the extended model if ``gain`` shows that it is worse on held-out data; then ``model``, ``extended``
+    and ``parameters`` are those of the plain model. ``force_model`` is the plain model with its zero, if its inverse
+    gives a better force than that of ``model``, else None; ``extended.force_rmse_n`` is of the model that `calibration`
+    compensates by. ``parameters`` are those of all effects of the model, as ``effect.parameter``, with their
+    ``covariance``.
+
+    ``minor`` are effects that stay in the model without being causes: immaterial, unsure, cancelled by others, or at a
+    bound. ``screening``: effects, and by how much each alone could lower the baseline's score (-2 log likelihood).
+    ``leftover`` says where the remaining structure lies.
+
+    ``limits_of_the_force`` are those of the ``limits`` that say where a calibration's force may be off, ``clipped`` the
+    share of samples that errors of the force leave out. ``left_out`` says which recordings were, and why; ``limits``
+    begin with it.
     """
 
     verdict: Verdict
@@ -259,17 +263,17 @@ class Diagnosis(Summarised):
 
     @property
     def limits_of_the_rest(self) -> tuple[str, ...]:
-        """``limits``, but for those that say which recordings were ``left_out``."""
+        """``limits`` without those that say which recordings were ``left_out``."""
         return self.limits[len(self.left_out) :]
 
     @property
     def minor_in_words(self) -> str:
-        """The effects of the extended model, adopted or rejected, that are no causes; empty where there are none."""
+        """The effects of the extended model, adopted or rejected, that are no causes; empty if there are none."""
         return listed(sorted(map(in_words, self.minor)), "and")
 
     @property
     def says_of_minor(self) -> str | None:
-        """The same as a sentence."""
+        """The sentence on these effects."""
         if not self.minor:
             return None
         which = "extended" if self.rejected is None else "rejected"
@@ -300,12 +304,13 @@ class Diagnosis(Summarised):
 
     @property
     def _sample_rate_hz(self) -> float:
+        """The sample rate of the first recording."""
         from smartshoe.calibration.provenance import without_rounding
 
         return without_rounding(sample_rate_of(self.traces[0].time_s))
 
     def plot(self) -> Figure:
-        """A figure: by recording, what the baseline and the extended model leave of the reading over time.
+        """A figure: for each recording, the residuals of the baseline and of the extended model over time.
 
         Raises `NotIdentifiableError` where the diagnosis was refused.
         """

@@ -1,4 +1,4 @@
-"""What all fitted recordings set together: the full scale that shares are of, and how far each may be thinned."""
+"""What all fitted recordings determine together: the full scale of all shares, and the thinning of each."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from smartshoe.recording import Recording
 from smartshoe.signals.loading import ramps
 from smartshoe.units import Unit
 
-# Resolutions, for the sake of speed: half and twice of each changed no name in two cases.
-SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
+# Resolutions, chosen for speed. Half and twice of each changed no name in two cases.
+SAMPLES_A_RAMP = 24  # samples of the fastest ramp from 10 to 90 % of the load
 MOST_SAMPLES = 12_000
-MOST_COARSENED = 6.0  # times, beyond what keeps the fastest ramp
+MOST_COARSENED = 6.0  # so many times coarser at most than what keeps the fastest ramp
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What the shares are of, over all that is fitted: the largest load in N and the span of the reading in ``unit``.
+    """Full scale of all fitted data: the largest load in N, and the span of the reading in ``unit``.
 
-    ``reading`` is negative where the reading falls as the load grows. ``zero`` is what is taken off every reading
-    before it is made a share: a convention of numbers that decides nothing, since each recording's offset is free.
+    ``reading`` is negative where the reading falls as the load grows. ``zero`` is subtracted from every reading; it is
+    a convention of no effect, since each recording's offset is free.
     """
 
     load_n: float
@@ -45,11 +45,11 @@ def full_scale(
     thresholds: Thresholds,
     following: Sequence[Recording] | None = None,
 ) -> Scale:
-    """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
+    """The largest load (99.9th percentile, so that a spike does not count) and the reading's span.
 
-    Negative where the reading falls as the load rises, in the recordings or in those ``following``, the same with each
-    reading at the moment whose load it follows: late by half a step, a reading that rises is low where the load is
-    high. Raises `NotIdentifiableError` where load or reading never changes, `UnitError` for readings of two quantities.
+    The span is negative where the reading falls as the load rises. The sign is taken from ``following``, the recordings
+    with lags removed, since a rising reading that is late by half a load step is low where the load is high. Raises
+    `NotIdentifiableError` where load or reading never changes, `UnitError` for readings of two quantities.
     """
     unit = recordings[0].sensor.unit
     pairs = [
@@ -58,21 +58,21 @@ def full_scale(
         if mask.any()
     ]
     load = max((float(np.percentile(np.abs(force), 99.9)) for force, _ in pairs), default=0.0)
-    # The span of each recording by itself: their zeros may differ by more than the load moves the reading.
+    # The span of each recording, since zeros may differ between recordings by more than the load moves the reading.
     spans = [float(np.ptp(np.percentile(values, [0.1, 99.9]))) for _, values in pairs]
     if load <= 0 or not spans or max(spans) <= 0:
         raise NotIdentifiableError(
             f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
         )
-    slope = moves_with(following or recordings, usable)
+    slope = load_reading_covariance(following or recordings, usable)
     zero = 0.0
     if unit.quantity != "pressure":
-        zero = float(np.median(np.concatenate([values[lowest(force, thresholds)] for force, values in pairs])))
+        zero = float(np.median(np.concatenate([values[at_lowest_load(force, thresholds)] for force, values in pairs])))
     return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
 
 
-def moves_with(recordings: Sequence[Recording], usable: Sequence[Mask]) -> float:
-    """Sum of products of load and reading about their means, over what is usable: negative where one falls."""
+def load_reading_covariance(recordings: Sequence[Recording], usable: Sequence[Mask]) -> float:
+    """Sum of products of load and reading about their means over usable samples; negative where one falls."""
     products = 0.0
     for recording, one in zip(recordings, usable, strict=True):
         mask = one & recording.sensor.present
@@ -83,7 +83,7 @@ def moves_with(recordings: Sequence[Recording], usable: Sequence[Mask]) -> float
 
 
 def reading_in(recording: Recording, unit: Unit) -> Array:
-    """(n,) the reading in ``unit``; raises `UnitError` naming the recording where it is of another quantity."""
+    """(n,) the reading in ``unit``; raises `UnitError` with the recording's name where its quantity differs."""
     sensor = recording.sensor
     if sensor.unit.quantity != unit.quantity:
         raise UnitError(
@@ -93,20 +93,19 @@ def reading_in(recording: Recording, unit: Unit) -> Array:
     return sensor.in_unit(unit)
 
 
-def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
-    """(n,) samples at the lowest load, where it stands still."""
+def at_lowest_load(load_n: Array, thresholds: Thresholds) -> Mask:
+    """(n,) True at the lowest load, within ``standing``."""
     low, high = float(np.percentile(load_n, 0.1)), float(np.percentile(load_n, 99.9))
     return np.asarray(load_n <= low + thresholds.standing * (high - low))
 
 
 def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> list[int]:
-    """By how much the samples of each recording may be thinned so that the fastest ramp of all keeps its shape.
+    """The factor by which each recording may be thinned so that the fastest ramp of all keeps its shape.
 
-    Where that leaves more than so many, further, down to what the fastest ramp needs at least: that of all recordings,
-    or its own where one may lose clearly more than they. Of quick steps between long holds, which take next to no
-    time, what is clear of that many samples is enough.
+    If too many samples are left, further, down to what the fastest ramp needs at least: the same factor for all, or a
+    recording's own where that is clearly larger. For quick steps between long holds fewer samples suffice.
     """
-    finest = []  # steps in samples, not rounded, at which the fastest ramp keeps its shape
+    finest = []  # factors, not rounded, at which the fastest ramp keeps its shape
     for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
         step_s = recording.sample_time_s
         load = recording.force_n / scale.load_n
@@ -129,7 +128,7 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
     wanted = -(-total // MOST_SAMPLES)
     factors = []
     for steps in finest:
-        # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
+        # Of a ramp without samples to spare a sixth is kept, where the logger itself resolved as much.
         kept = int(MOST_COARSENED * min(steps, max(1, int(steps)))) or round(MOST_COARSENED)
         factors.append(max(shape, min(wanted, kept)))
     alike = min(factors)
@@ -137,10 +136,10 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
 
 
 def fitted_lengths(recordings: Sequence[Recording], factors: Sequence[int]) -> list[int]:
-    """Samples from the beginning of each recording that are fitted: all, unless thinned by ``factors`` they are many.
+    """The number of samples from the start of each recording that are fitted: all, unless there are too many.
 
-    Quick loads that go on for hours, thinned further, would be told as a delay; and one part of them is like another.
-    Short recordings stay whole, of the others all give up what is beyond one length.
+    Quick loads over hours, thinned further, would appear as a delay, and one part is like another. Short recordings
+    stay whole; the others are cut to one common length.
     """
     counts = [len(one) / factor for one, factor in zip(recordings, factors, strict=True)]
     room, longest = MOST_COARSENED * MOST_SAMPLES, math.inf
@@ -157,7 +156,7 @@ def fitted_lengths(recordings: Sequence[Recording], factors: Sequence[int]) -> l
 
 
 def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:
-    """By how much each load moves, in full scales; one where that is nearly all, or where it stands still."""
+    """(recordings,) range of each load in full scales; 1 where it is nearly all, or where the load stands still."""
     spans = np.array([np.ptp(np.percentile(one.force_n, [0.1, 99.9])) for one in recordings]) / scale.load_n
     is_part = (spans > standing * spans.max()) & (spans < 1.0 - standing)
     return np.where(is_part, spans, 1.0)

@@ -1,4 +1,4 @@
-"""The set of effects with the most evidence: forward, with drops and swaps, over one linearisation."""
+"""The set of effects with the most evidence in one linearisation: stepwise additions, removals and swaps."""
 
 from __future__ import annotations
 
@@ -7,74 +7,80 @@ from collections.abc import Collection
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 
-# Resolutions of the search: half and twice of each changed no name in two cases.
+# Resolutions of the search. Half and twice of each changed no name in two cases.
 MOST_MEMBERS = 7
-BREADTH = 5  # of the likeliest, that are weighed beside a set
-SWAPS = 3  # that are weighed in the place of each member; and fits of whole models that are gone on with
-RIVALS = 2  # that are fitted as whole models beside the best, or shapes from which one is
-DEAD_HEAT = 1e-6  # of -2 log evidence: what differs by less is a dead heat
+BREADTH = 5  # most probable additions that are weighed for a set
+SWAPS = 3  # additions that are weighed in the place of each member; also whole-model fits that are pursued
+RIVALS = 2  # rivals fitted as whole models beside the best one; also shapes that a fit starts from
+SCORE_TOLERANCE = 1e-6  # of -2 log evidence: scores that differ by less are equal
 
 
-def allowed(evidence: Evidence, found: Posterior) -> bool:
-    """Whether every member's strengths lie on the side that physics allows, and no two cancel each other.
+def is_admissible(evidence: Evidence, found: Posterior) -> bool:
+    """Whether each strength has a physical sign and the members do not cancel one another.
 
-    Members that are each far larger than all of them together fit by their difference, which is neither's.
+    Members that are each far larger than their sum fit by their difference, which is neither's effect.
     """
     if sum(size**2 for size in found.sizes) > (evidence.thresholds.clear * found.together) ** 2:
         return False
-    return all(has_its_sign(evidence, m, s) for m, s in zip(found.members, found.strengths, strict=True))
+    return all(has_physical_sign(evidence, m, s) for m, s in zip(found.members, found.strengths, strict=True))
 
 
-def has_its_sign(evidence: Evidence, member: int, strengths: Array) -> bool:
-    """Whether the one strength of a candidate lies where physics allows; of what is in the model, its bounds saw to it.
+def has_physical_sign(evidence: Evidence, member: int, strengths: Array) -> bool:
+    """Whether a candidate's strength has the sign that physics allows.
 
-    Of several (k,) the linear estimates may lie beyond: a fit holds them within their bounds.
+    Asked only of a candidate with one strength that is not in the model yet: a fit keeps the others within their
+    bounds, although the linear estimates of several strengths (k,) may lie beyond.
     """
-    one = evidence.given.candidates[member]
-    return len(strengths) != 1 or one.name in evidence.given.model.names or one.has_sign_of(strengths)
+    one = evidence.linearisation.candidates[member]
+    return len(strengths) != 1 or one.name in evidence.linearisation.model.names or one.allows_sign_of(strengths)
 
 
-def additions(evidence: Evidence, members: Members, breadth: int = BREADTH, banned: Collection[str] = ()) -> list[int]:
-    """Candidates that promise most beside ``members``, one shape an effect, best first."""
-    taken = {evidence.given.candidates[m].slot for m in members}
+def best_additions(
+    evidence: Evidence, members: Members, breadth: int = BREADTH, banned: Collection[str] = ()
+) -> list[int]:
+    """The candidates that lower the score of ``members`` most, at most ``breadth``, each effect at its best shape."""
+    taken_slots = {evidence.linearisation.candidates[m].slot for m in members}
     best: dict[str, tuple[float, int]] = {}
     for score, k, strengths in evidence.extensions(members):
-        one = evidence.given.candidates[k]
-        if one.slot in taken or one.name in banned:
+        one = evidence.linearisation.candidates[k]
+        if one.slot in taken_slots or one.name in banned:
             continue
-        if not has_its_sign(evidence, k, strengths):
+        if not has_physical_sign(evidence, k, strengths):
             continue
         if one.name not in best or score < best[one.name][0]:
             best[one.name] = (score, k)
     return [k for _, k in sorted(best.values())[:breadth]]
 
 
-def step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
-    """The best set that one addition, drop or swap makes of ``start``, or ``start`` itself."""
+def best_step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
+    """The best set that one addition, removal or swap makes of ``start``, or ``start`` itself."""
     best = evidence.posterior(start)
     sets: list[Members] = []
     if len(best.members) < MOST_MEMBERS:
-        sets += [(*best.members, k) for k in additions(evidence, best.members, BREADTH, banned)]
+        sets += [(*best.members, k) for k in best_additions(evidence, best.members, BREADTH, banned)]
     for member in best.members:
-        less = best.without(member)
-        sets += [less, *((*less, k) for k in additions(evidence, less, SWAPS, banned))]
-    evidence.make_ready({member for members in sets for member in members})
+        without_member = best.without(member)
+        sets += [
+            without_member,
+            *((*without_member, k) for k in best_additions(evidence, without_member, SWAPS, banned)),
+        ]
+    evidence.prepare_departures({member for members in sets for member in members})
     trials = (evidence.posterior(members) for members in sets)
-    return min([best, *(one for one in trials if allowed(evidence, one))], key=lambda one: one.score)
+    return min([best, *(one for one in trials if is_admissible(evidence, one))], key=lambda one: one.score)
 
 
 def search(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
-    """The best set that forward steps, drops and swaps find from ``start``."""
+    """The best set that repeated steps reach from ``start``."""
     best = evidence.posterior(start)
     while True:
-        found = step(evidence, best.members, banned)
-        if found.score >= best.score - DEAD_HEAT:
+        found = best_step(evidence, best.members, banned)
+        if found.score >= best.score - SCORE_TOLERANCE:
             return best
         best = found
 
 
-def needed(evidence: Evidence, members: Members) -> Members:
-    """``members`` without those of which one after the other has less evidence for it than against it."""
+def backward_eliminated(evidence: Evidence, members: Members) -> Members:
+    """``members`` after backward elimination: the member whose removal lowers the score most goes, while any does."""
     best = evidence.posterior(members)
     while best.members:
         fewer = (evidence.posterior(best.without(gone)) for gone in best.members)

@@ -1,9 +1,9 @@
-"""Sensitivities of the reading to everything that could be wrong: the columns that all inference works on.
+"""Sensitivities of the reading to everything that could be wrong: the columns on which all inference works.
 
-The model is linearised about a fit. Its own parameters, each effect of the catalogue at each point of its shapes, and
-each flexible block give columns; an effect that is already in the model gives its whole contribution. Each recording
-has nuisances of its own, an offset, what an earlier load left in the relaxing arm and, where they differ by it, a gain;
-they are marginalised exactly (flat and Gaussian priors), so that no zero is ever assumed.
+The model is linearised about a fit. Columns are given by its own parameters, by each effect of the catalogue at each
+point of its shapes, and by each flexible block; an effect that is in the model gives its whole contribution. Each
+recording has its own nuisances: an offset, the memory of earlier loads in the relaxing arm and, where recordings differ
+by it, a gain. They are marginalised exactly (flat and Gaussian priors), so that no zero is ever assumed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
 from smartshoe.diagnosis._session import Session, fitted_of, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
@@ -27,20 +27,20 @@ from smartshoe.models.effects.exposure import CHANNELS
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.lags import lagged
 
-NO_PRESSURES = frozenset({"force", "length", "resistance", "capacitance", "angle"})  # as a voltage or counts may be
+NON_PRESSURES = frozenset({"force", "length", "resistance", "capacitance", "angle"})  # a voltage or counts may be one
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect, or a flexible block, at one point of its shapes, and where its strengths' columns stand.
+    """An effect, or a flexible block, at one point of its shapes, and the columns of its strengths.
 
-    ``is_apart``: the data tells its branch from the others of its family.
+    ``is_distinguishable``: the data distinguishes its branch from the others of its family.
     """
 
     effect: Effect
     shape: Mapping[str, float]
     columns: tuple[int, ...]
-    is_apart: bool = True
+    is_distinguishable: bool = True
 
     @property
     def name(self) -> str:
@@ -49,16 +49,16 @@ class Candidate:
 
     @property
     def branch(self) -> str:
-        """Of what there is one in a unit: a law, or a flexible block in its place, of each branch of a family."""
-        return (self.is_apart and self.effect.branch) or self.effect.kind
+        """The branch of a family: a unit has one law, or the flexible block in its place, of each branch."""
+        return (self.is_distinguishable and self.effect.branch) or self.effect.kind
 
     @property
     def slot(self) -> str:
-        """Of what a search puts one in a set: of each branch, but of all curves one, since they bend for each other."""
+        """The key of which a set has one at most: the branch, but one key for all curves, which bend for each other."""
         return self.effect.kind if self.effect.is_memoryless else self.branch
 
     def start(self, strengths: Array) -> Array:
-        """Parameter values (p,) with these changes of the strengths from null, within their bounds."""
+        """Parameter values (p,) with the strengths (k,) added to null, clipped to their bounds."""
         values = self.effect.start(self.shape)
         k = 0
         for j, parameter in enumerate(self.effect.parameters):
@@ -67,8 +67,8 @@ class Candidate:
                 k += 1
         return values
 
-    def has_sign_of(self, strengths: Array) -> bool:
-        """Whether changes (k,) of the strengths lie on the side of null that physics allows."""
+    def allows_sign_of(self, strengths: Array) -> bool:
+        """Whether strengths (k,), counted from null, have the sign that physics allows."""
         bounded = [p for p in self.effect.parameters if p.null is not None]
         return all(
             (p.lower < p.null or value >= 0.0) and (p.upper > p.null or value <= 0.0)
@@ -78,22 +78,22 @@ class Candidate:
 
 
 def is_remembered_by_gas(effect: Effect) -> bool:
-    """Whether it is what a gas remembers, which shows in its pressure alone."""
+    """Whether it is a memory of the gas, which only a gas pressure shows."""
     return effect.stage == "gas" and not effect.is_memoryless
 
 
-def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
-    """Physical effects and flexible blocks whose channels were logged throughout.
+def available_effects(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
+    """Physical effects and flexible blocks that this data could show: their channels are logged in every recording.
 
-    Not those that shift load or reading by one value, which no waveform tells from a recording's own offset
-    (`smartshoe.diagnosis._zero`); nor those that only later load cycles show, where no recording has any. Of a pressure
-    that falls in holds the gas is the cause; of other readings the sensor may be, too.
+    Left out are effects that shift load or reading by a constant, which no waveform distinguishes from a recording's
+    offset (`smartshoe.diagnosis._zero`), and effects of later load cycles where no recording has any. Relaxation of a
+    pressure is attributed to the gas; of other readings the sensor may be its cause, too.
     """
     has = logged_channels(sessions)
     has_cycles = have_later_cycles(sessions, thresholds)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
-    if any(one.is_no_gas for one in sessions):
+    if any(one.without_gas_memory for one in sessions):
         found = [e for e in found if not is_remembered_by_gas(e)]
     if not any(one.recording.sensor.unit.quantity == "pressure" for one in sessions):
         found = [e.of_any_sensor() for e in found]
@@ -101,7 +101,7 @@ def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effec
 
 
 def logged_channels(sessions: Sequence[Session]) -> set[str]:
-    """What every recording holds besides load and reading, in the words of `smartshoe.models.effects.exposure`."""
+    """The channels that every recording has besides load and reading, in the words of `models.effects.exposure`."""
     channels = (("temperature", "temperature_k"), ("neighbour", "neighbour"))
     logged = {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
     begin_apart = "temperature" in logged and any(s.conditions.begins_warmer_k for s in sessions)
@@ -109,16 +109,16 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
 
 
 def logged_words(sessions: Sequence[Session]) -> frozenset[str]:
-    """`logged_channels`, and the columns that every recording has under such a word, of which no effect knows."""
+    """`logged_channels`, and columns of such names in every recording that no effect uses."""
     columns = set.intersection(*({*one.recording.channels} for one in sessions))
     return frozenset(logged_channels(sessions) | (CHANNELS & columns))
 
 
 def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) -> Array:
-    """(n, 2 + k): one, and exp(-p t), the memory that the unit brings along from before the recording.
+    """(n, 2 + k) columns of a recording's nuisances: one for the offset, exp(-p t) for its initial memory, and k more.
 
-    After them, for each gain of its own: by how much that moves what a model has ``read`` (n,); from each moment on at
-    which its zero changes, by how much it may; and after each long gap a memory again, of a load that nobody knows.
+    The k more are, for each own gain, the share of ``read`` (n,) in its part of the time; for each change of the zero,
+    a step of its prior size; and after each long gap, a memory again, of a load that nobody knows.
     """
     time_s = session.conditions.time_s
     own = [session.own_gain_sd * read * part for part in session.gain_parts]
@@ -134,59 +134,59 @@ def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) ->
 
 
 def nuisance_precision(session: Session, model: ExtendedModel) -> Array:
-    """(2 + k, 2 + k) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
+    """(2 + k, 2 + k) prior precision of `nuisances`: none for the offset, that of an unknown past for the memory.
 
-    A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
-    rest still carries some of what went before. One more row for each gain of its own, each change of its zero, and
-    each long gap, in which any load may have come.
+    A unit that begins loaded has been loaded for an unknown time, so that the whole state of the arm is open; one that
+    begins at rest still carries some of what went before. During a long gap any load may have come.
     """
     sd = past_sd(session, model)
     gap_sd = max(abs(model.relaxing_share) * abs(model.gain) * float(np.max(session.conditions.load)), FLOOR)
-    return a_nuisance_each(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
+    return nuisance_diagonal(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
 
 
 def past_sd(session: Session, model: ExtendedModel) -> float:
-    """Standard deviation of what the arm brings along: of the load that it begins with, ``unknown_past`` at least."""
+    """Prior standard deviation of the initial memory: that of the first load, or of ``unknown_past`` if larger."""
     held = abs(model.relaxing_share) * abs(model.gain)
     return max(held * max(float(np.abs(session.conditions.load[0])), session.unknown_past), FLOOR)
 
 
-def a_nuisance_each(session: Session, *, offset: float, past: float, change: float, gap: float) -> Array:
-    """(2 + k, 2 + k) diagonal: a number for each column of `nuisances`, in their order."""
+def nuisance_diagonal(session: Session, *, offset: float, past: float, change: float, gap: float) -> Array:
+    """(2 + k, 2 + k) diagonal matrix with a number for each kind of column of `nuisances`."""
     changes = [change] * (len(session.gain_parts) + len(session.zero_changes))
     return np.diag([offset, past, *changes, *[gap] * len(session.gap_ends)])
 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """A model's columns over what may be fitted.
+    """A model's columns over the fitted samples.
 
-    ``rows``, a session each (n, m): target, own parameters, candidates' strengths. The target is the residual with the
-    contributions of the model's effects put back. ``own``: number of baseline columns. Columns are scaled so that a
-    coefficient is the rms by which it moves the reading, in shares of full scale; ``scales`` (m,) undoes that.
+    ``rows``, (n, m) for each session: target, baseline parameters, strengths of candidates. The target is the residual
+    with the contributions of the model's effects added back. ``baseline_count`` is the number of baseline columns.
+    Columns are scaled so that a coefficient is the rms by which it moves the reading, a share of full scale; ``scales``
+    (m,) undo that.
     """
 
     model: ExtendedModel
     sessions: tuple[Session, ...]
     rows: tuple[Array, ...]
     scales: Array
-    own: int
+    baseline_count: int
     candidates: tuple[Candidate, ...]
     thresholds: Thresholds
 
     @cached_property
     def shapes(self) -> Mapping[str, int]:
-        """At how many points of its shapes each effect stands."""
+        """The number of shapes at which each effect is a candidate."""
         return Counter(one.name for one in self.candidates)
 
     @property
     def places(self) -> dict[tuple[str, tuple[float, ...]], tuple[int, ...]]:
-        """Where the strengths' columns of what is not in the model stand, by effect and shape."""
+        """The columns of effects that are not in the model, by effect and shape."""
         return {_place(one): one.columns for one in self.candidates[len(self.model.parts) :]}
 
     @cached_property
     def nuisances(self) -> tuple[Array, ...]:
-        """(n, k) a session: what is its own."""
+        """The columns (n, k) of each session's nuisances."""
         pole_per_s, read = self.model.pole_per_s, self.model.simulate
         return tuple(
             nuisances(one, pole_per_s, read(one.conditions) if one.own_gain_sd else 0.0) for one in self.sessions
@@ -194,36 +194,39 @@ class Linearised:
 
     @property
     def nuisance_counts(self) -> list[int]:
-        """k, a session."""
-        return [own.shape[1] for own in self.nuisances]
+        """The number k of nuisances of each session."""
+        return [baseline_count.shape[1] for baseline_count in self.nuisances]
 
     @cached_property
-    def past(self) -> tuple[Array, ...]:
-        """``nuisances`` where they may be fitted."""
-        return tuple(where(session.fitted, own) for own, session in zip(self.nuisances, self.sessions, strict=True))
+    def fitted_nuisances(self) -> tuple[Array, ...]:
+        """``nuisances`` over the fitted samples."""
+        return tuple(
+            rows_where(session.fitted, baseline_count)
+            for baseline_count, session in zip(self.nuisances, self.sessions, strict=True)
+        )
 
     @cached_property
-    def seen(self) -> tuple[Array, ...]:
-        """``rows`` where they may be fitted."""
-        return tuple(where(session.fitted, rows) for rows, session in zip(self.rows, self.sessions, strict=True))
+    def fitted_rows(self) -> tuple[Array, ...]:
+        """``rows`` over the fitted samples."""
+        return tuple(rows_where(session.fitted, rows) for rows, session in zip(self.rows, self.sessions, strict=True))
 
     @cached_property
     def products(self) -> tuple[Array, ...]:
-        """(m + k, m + k) a session: inner products over what is fitted, the k nuisances' last."""
-        return tuple(_products(seen, past) for seen, past in zip(self.seen, self.past, strict=True))
+        """(m + k, m + k) inner products of each session over the fitted samples; the k nuisances stand last."""
+        return tuple(_products(rows, own) for rows, own in zip(self.fitted_rows, self.fitted_nuisances, strict=True))
 
     @cached_property
     def gram(self) -> Array:
-        """(m, m) inner products of the target and all columns, in order, over all sessions; flat nuisances are out."""
+        """(m, m) inner products of target and columns over all sessions, with flat nuisances projected out."""
         return np.asarray(sum(_without_last(*one) for one in zip(self.products, self.nuisance_counts, strict=True)))
 
     @cached_property
     def factors(self) -> tuple[Array, ...]:
-        """(n, 6) a session: smooth functions of load, direction, rate and time, on which a size may depend."""
+        """(n, 6) for each session: smooth functions of load, direction, rate and time on which a size may depend."""
         return tuple(_factors(session, self.thresholds) for session in self.sessions)
 
     def noise_sd(self) -> float:
-        """Standard deviation of what no column reaches, noise or structure, each correlation time counted once."""
+        """Standard deviation of what no column explains, noise or structure, counted once per correlation time."""
         whole = self.gram
         part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
         found = np.linalg.solve(part, whole[1:, 0])
@@ -234,17 +237,17 @@ class Linearised:
             fit = np.linalg.lstsq(columns[mask], residual[mask], rcond=None)[0]
             left.append(residual - columns @ fit)
         masks = [session.fitted for session in self.sessions]
-        return correlated_sd(left, masks)
+        return effective_noise_sd(left, masks)
 
 
 def marginal(rows: Array, session: Session, pole_per_s: float) -> Array:
-    """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
+    """(m, m) inner products of ``rows`` (n, m) over the fitted samples, with the session's nuisances projected out."""
     past = nuisances(session, pole_per_s)[session.fitted]
     return _without_last(_products(rows[session.fitted], past), past.shape[1])
 
 
-def where(mask: Mask, columns: Array) -> Array:
-    """Rows of (n, m) columns, each column in one piece; themselves where none is left out."""
+def rows_where(mask: Mask, columns: Array) -> Array:
+    """The rows of (n, m) columns where ``mask``, each column contiguous; ``columns`` itself if that is all."""
     if mask.all():
         return columns
     kept = np.flatnonzero(mask)
@@ -252,7 +255,7 @@ def where(mask: Mask, columns: Array) -> Array:
     if 100 * ends.size >= kept.size:
         return np.take(columns.T, kept, axis=1).T
     out = np.empty((kept.size, columns.shape[1]), order="F")
-    for first, last in pairwise((0, *ends, kept.size)):  # whole load cycles: long pieces take a tenth of the time
+    for first, last in pairwise((0, *ends, kept.size)):  # long pieces are copied ten times as fast
         out[first:last] = columns[kept[first] : kept[first] + last - first]
     return out
 
@@ -263,36 +266,37 @@ def _power(columns: Array) -> Array:
 
 
 def _products(seen: Array, past: Array) -> Array:
+    """(m + k, m + k) inner products of rows (n, m) and nuisances (n, k), the latter last."""
     cross = seen.T @ past
     return np.block([[seen.T @ seen, cross], [cross.T, past.T @ past]])
 
 
 def _without_last(products: Array, count: int) -> Array:
-    """(m, m) inner products (m + count, m + count) with what the last ``count`` columns follow taken out."""
+    """(m, m) of products (m + count, m + count), with the last ``count`` columns projected out."""
     last, cross = products[-count:, -count:], products[-count:, :-count]
     return np.asarray(products[:-count, :-count] - cross.T @ np.linalg.solve(ridged(last), cross))
 
 
 def ridged(inner: Array) -> Array:
-    """(k, k) inner products with a trillionth more on the diagonal: columns that are alike can be solved for."""
+    """(k, k) inner products with a relative ridge of 1e-12, so that collinear columns can be solved for."""
     held = inner.copy()
     held.flat[:: inner.shape[0] + 1] += 1e-12 * max(float(np.trace(inner)), 1e-12)
     return held
 
 
 def cosines(inner: Array) -> Array:
-    """(k, k) cosines of the columns whose inner products (k, k) are given; 0 with a column of nothing."""
+    """(k, k) cosines of columns from their inner products (k, k); 0 for a column of zeros."""
     norm = np.sqrt(np.maximum(np.diag(inner), 1e-300))
     return np.asarray(inner / np.outer(norm, norm))
 
 
 def linearised(
-    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, beside: Linearised | None = None
+    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, nearby: Linearised | None = None
 ) -> Linearised:
-    """The columns about ``model``; ``beside``: those about a model nearby, which serve for what is in neither."""
+    """The columns about ``model``; columns of ``nearby``, a similar model, serve effects that are in neither."""
     fitted = fitted_of(sessions)
     inside = {part.name: part for part in model.parts}
-    outside = [e for e in available(fitted, thresholds) if e.name not in inside]
+    outside = [e for e in available_effects(fitted, thresholds) if e.name not in inside]
     channels = logged_channels(fitted)
     present = excitation_of(fitted, thresholds).tells_apart
     apart = {one.name: is_told_from_its_family(one, present) for one in (*outside, *(p.effect for p in model.parts))}
@@ -307,14 +311,14 @@ def linearised(
             own = tuple(range(place, place + strengths))
             candidates.append(Candidate(effect, shape, own, apart[effect.name]))
             place += strengths
-    known = {} if beside is None else beside.places
+    known = {} if nearby is None else nearby.places
     kept = [one for one in candidates[len(model.parts) :] if _place(one) in known]
     beyond = [
         (one, model.extended_by(one.effect, one.effect.start(one.shape)))
         for one in candidates[len(model.parts) :]
         if _place(one) not in known
     ]
-    less = [model.without(part.name) for part in model.parts]
+    reduced = [model.without(part.name) for part in model.parts]
     rows = []
     for k, session in enumerate(fitted):
         trace = model.trace(session.conditions)
@@ -322,34 +326,35 @@ def linearised(
         columns = np.empty((reading.size, place), order="F")
         columns[:, 0] = session.reading - reading
         columns[:, 1:4] = slopes[:, :3]
-        for column, without in enumerate(less, start=4):
+        for column, without in enumerate(reduced, start=4):
             columns[:, column] = reading - without.simulate(session.conditions)
             columns[:, 0] += columns[:, column]
         for added, by in beyond:
             first = added.columns[0]
             model.column_of(by, session.conditions, trace, columns[:, first : first + len(by)])
         for one in kept:
-            assert beside is not None
+            assert nearby is not None
             of = list(known[_place(one)])
-            columns[:, list(one.columns)] = beside.rows[k][:, of] * beside.scales[of]
+            columns[:, list(one.columns)] = nearby.rows[k][:, of] * nearby.scales[of]
         rows.append(columns)
-    power = np.sum([_power(where(one.fitted, part)) for part, one in zip(rows, fitted, strict=True)], axis=0)
-    _refuse_endless(power, candidates)
+    power = np.sum([_power(rows_where(one.fitted, part)) for part, one in zip(rows, fitted, strict=True)], axis=0)
+    _refuse_non_finite(power, candidates)
     count = sum(int(s.fitted.sum()) for s in fitted)
     scales = np.sqrt(power / count)
     scales[0] = 1.0
-    scales[scales < FLOOR] = 1.0  # what is less than any noise is rounding, and is not made as large as the others
+    scales[scales < FLOOR] = 1.0  # a column below any noise is rounding, and is not scaled up
     for columns in rows:
         columns /= scales
     return Linearised(model, fitted, tuple(rows), scales, 3, tuple(candidates), thresholds)
 
 
 def _place(one: Candidate) -> tuple[str, tuple[float, ...]]:
+    """The key of a candidate: its effect and shape."""
     return one.name, tuple(one.shape.values())
 
 
-def _refuse_endless(power: Array, candidates: Sequence[Candidate]) -> None:
-    """Raises `UsageError` for a candidate whose columns, of ``power`` (m,), hold no number: no search would end."""
+def _refuse_non_finite(power: Array, candidates: Sequence[Candidate]) -> None:
+    """Raises `UsageError` for a candidate whose columns, of ``power`` (m,), are not finite: no search would end."""
     for one in candidates:
         if not np.isfinite(power[list(one.columns)]).all():
             at = ", ".join(f"{name} = {value:g}" for name, value in one.shape.items())
@@ -360,20 +365,21 @@ def _refuse_endless(power: Array, candidates: Sequence[Candidate]) -> None:
 
 
 def _shape_of(effect: Effect, values: Array) -> dict[str, float]:
+    """The shape parameters among an effect's ``values``."""
     return {p.name: float(v) for p, v in zip(effect.parameters, values, strict=True) if p.null is None}
 
 
 def directions(thresholds: Thresholds) -> int:
-    """How many `departures` an equation has: six factors of its size, and a lag for each time constant."""
+    """The number of `departures` of an equation: six factors of its size, and a lag for each time constant."""
     return 6 + len(thresholds.memory_s)
 
 
 def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
-    """(n, `directions`) a session: those in which a law departs from an equation of its kind, each of the column's rms.
+    """(n, `directions`) for each session: directions in which laws depart from an equation, each of the column's rms.
 
-    ``column`` (n,) is the equation's own signature. A law of the same kind has its size depend otherwise on the load,
-    the direction, the rate and the time, or follows with other time constants: the signature times smooth functions of
-    these, and its lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
+    ``column`` (n,) is the signature of the equation. Other laws of its kind depend otherwise on load, direction, rate
+    and time, or follow with other time constants: so the directions are the signature times smooth functions of these,
+    and its lags. A departure is in proportion to the effect (Kennedy and O'Hagan 2001).
     """
     out, power, size = [], np.zeros(directions(given.thresholds)), 0.0
     for session, factors, own in zip(given.sessions, given.factors, column, strict=True):
@@ -381,7 +387,7 @@ def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
         np.multiply(own[:, None], factors, out=part[:, : -len(given.thresholds.memory_s)])
         for k, tau_s in enumerate(given.thresholds.memory_s, start=factors.shape[1]):
             np.subtract(lagged(own, session.conditions.step_s, tau_s), own, out=part[:, k])
-        power += _power(where(session.fitted, part))
+        power += _power(rows_where(session.fitted, part))
         size += float(np.sum(own[session.fitted] ** 2))
         out.append(part)
     ratio = np.minimum(np.sqrt(size / np.maximum(power, 1e-300)), 1e6)
@@ -391,6 +397,7 @@ def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
 
 
 def _factors(session: Session, thresholds: Thresholds) -> Array:
+    """(n, 6) Legendre polynomials of load and time, direction, and logarithm of the rate."""
     load, rate = session.conditions.load, session.conditions.rate_per_s
     time_s, step_s = session.conditions.time_s, session.conditions.step_s
     still = thresholds.still_per_s

@@ -1,8 +1,8 @@
-"""Sessions: recordings in shares of full scale, smoothed alike, thinned, cut into load cycles.
+"""Sessions: recordings in shares of full scale, filtered, thinned and cut into load cycles.
 
-Load and reading pass the same short zero-phase filter. Linear physics commutes with it, so that nothing is falsified;
-noise on the reference load, which would make a smoother prediction fit better and so imitate a lag or a dead band, is
-mostly gone; and a fit costs a fraction.
+Load and reading pass the same short zero-phase filter, with which linear physics commutes, so that nothing is
+distorted. Noise on the reference load would make a smoother simulation fit better and so imitate a lag or a dead band;
+the filter removes most of it, and a fit costs a fraction.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
-from smartshoe.diagnosis._jittered import as_sampled
+from smartshoe.diagnosis._jittered import with_sampling_jitter
 from smartshoe.diagnosis._neighbours import neighbours_of
 from smartshoe.diagnosis._scale import Scale, reading_in
 from smartshoe.diagnosis._slow_stretches import spacing_of
@@ -30,32 +30,32 @@ from smartshoe.signals.loading import rises_of
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
 
-LEAST_WINDOW = 3  # samples on either side of the average: a resolution, half and twice changed no name in two cases
+LEAST_WINDOW = 3  # samples on either side of the average, a resolution: half and twice changed no name in two cases
 
 
 @dataclass(frozen=True, eq=False)
-class Quiet:
-    """The load (n,) without its noise, whose standard deviation was ``raw``, and what is ``left`` of that."""
+class DenoisedLoad:
+    """The ``load`` (n,) without its noise; standard deviations of that noise before (``raw_sd``) and after."""
 
     load: Array
-    raw: float
-    left: float
+    raw_sd: float
+    remaining_sd: float
 
 
 @dataclass(frozen=True, eq=False)
 class Session:
     """One recording on an even grid, in shares of full scale (`smartshoe.models.effects.Conditions`).
 
-    ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
-    left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a part of the time where there are few.
-    ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
-    ``quiet`` is the load at the full rate. ``own_gain_sd``: standard deviation, as a share, by which the gain of one
-    recording lies beside that of all; 0 where they share one. ``gain_changes``: the samples from which on it is
-    another, in order; ``zero_changes`` those from which on its reading without load is, by ``zero_sd`` of full scale.
-    ``gap_ends``: the first samples after gaps in which the load is not known for so long that the wall may have crept.
-    ``unknown_past``: the load, as a share, that a unit may remember from before it where it begins at rest.
-    ``white_sd``: standard deviation of the reading's white noise at the full rate, as ``quiet.raw`` is of the load's.
-    ``is_no_gas``: what a gas remembers is not looked for in it.
+    Samples (n,): ``reading``; ``usable``, False where missing or faulty; ``held_out``, True where left out of every
+    fit; ``cycle``, the number of the load cycle, or of a part of the time where there are few; ``resting``, True
+    without load.
+
+    ``index`` is the recording's place, ``thinned`` the factor of thinning, ``denoised`` the load at the full rate.
+    ``own_gain_sd`` is the prior standard deviation of the recording's own gain, relative to the common one; 0 where all
+    share it. At the samples ``gain_changes`` the gain changes again; at ``zero_changes`` the zero does, with prior
+    ``zero_sd``. ``gap_ends`` are the first samples after gaps with an unknown load that are long enough for the wall to
+    creep. ``unknown_past``: the load that a unit at rest may still remember. ``white_sd`` is the standard deviation of
+    the reading's white noise at the full rate. ``without_gas_memory``: effects by which a gas remembers are not sought.
     """
 
     recording: Recording
@@ -67,7 +67,7 @@ class Session:
     cycle: Index
     resting: Mask
     thinned: int
-    quiet: Quiet
+    denoised: DenoisedLoad
     own_gain_sd: float = 0.0
     gain_changes: tuple[int, ...] = ()
     zero_changes: tuple[int, ...] = ()
@@ -75,11 +75,11 @@ class Session:
     gap_ends: tuple[int, ...] = ()
     unknown_past: float = 1.0
     white_sd: float = 0.0
-    is_no_gas: bool = False
+    without_gas_memory: bool = False
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:
-        """(n,) each: the samples of one gain of its own; none where all recordings share one."""
+        """(n,) for each own gain, True where it holds; empty where all recordings share one gain."""
         if not self.own_gain_sd:
             return ()
         at = np.arange(self.reading.size)
@@ -92,17 +92,17 @@ class Session:
 
     @property
     def judged(self) -> Mask:
-        """(n,) the samples that a fit must not use, for judging it."""
+        """(n,) the samples that only judge a fit."""
         return self.usable & self.held_out
 
 
 def fitted_of(sessions: Iterable[Session]) -> tuple[Session, ...]:
-    """Those of which anything is fitted."""
+    """The sessions of which any sample is fitted."""
     return tuple(session for session in sessions if session.fitted.any())
 
 
 def all_fitted(sessions: Iterable[Session]) -> list[Session]:
-    """The same, of which nothing is held out."""
+    """The same sessions with nothing held out."""
     return [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions]
 
 
@@ -114,20 +114,20 @@ def prepare(
     factors: Sequence[int],
     thresholds: Thresholds,
 ) -> list[Session]:
-    """The sessions; ``held_out`` a recording, or None to hold every third load cycle out.
+    """The sessions of ``recordings``; ``held_out`` for each recording, or None to hold out every third load cycle.
 
-    ``factors``: by which the first recordings are thinned; all others are by the least of them.
+    ``factors`` thin the first recordings; all others are thinned by the smallest of them.
     """
     factors = [*factors, *[min(factors)] * (len(recordings) - len(factors))]
     made: dict[int, Session] = {}
-    left_behind: dict[str | None, _Past] = {}
+    histories: dict[str | None, _History] = {}
     order = _by_continuation(recordings)
     for index in order:
         recording = recordings[index]
-        past = left_behind.get(_before(recording), _Past())
+        past = histories.get(_predecessor(recording), _History())
         made[index] = _session(recording, index, usable[index], scale, factors[index], past, thresholds)
-        left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
-    sessions = _on_one_scale([made[index] for index in range(len(recordings))])
+        histories[recording.name] = _history_after(made[index].conditions, thresholds)
+    sessions = _with_common_temperature_zero([made[index] for index in range(len(recordings))])
     if held_out is not None:
         return [
             replace(session, held_out=np.full(session.reading.size, out))
@@ -137,10 +137,9 @@ def prepare(
 
 
 def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresholds: Thresholds) -> list[Session]:
-    """``sessions`` of which one load cycle in so many judges, counted on from each to the next in ``order``.
+    """``sessions`` with every so many load cycles held out, counted on from one to the next in ``order``.
 
-    That is the order in which the unit bore them, as far as it is known, and of what they hold: neither a name nor
-    which was given first decides anything.
+    The order is that of the loads as far as known, else by content, so that neither names nor the order given decide.
     """
     count, kept = 0, [*sessions]
     for index in order:
@@ -150,8 +149,8 @@ def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresho
     return kept
 
 
-def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
-    """``sessions`` with all temperatures above that where the first that has one begins."""
+def _with_common_temperature_zero(sessions: Sequence[Session]) -> list[Session]:
+    """``sessions`` with temperatures relative to the first temperature logged in any of them."""
     logged = [kelvin for one in sessions if (kelvin := one.conditions.temperature_k) is not None]
     return [
         one
@@ -162,70 +161,70 @@ def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
 
 
 def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
-    """Places of the recordings by what they hold, but each after the one that it continues, in whatever order they are.
+    """The recordings' places ordered by content, but each after the one that it continues.
 
-    Names only tell which continues which: files that are renamed are the same data.
+    Names only tell which continues which: a renamed file is the same data.
     """
     order: list[int] = []
     waiting = sorted(range(len(recordings)), key=lambda k: _content(recordings[k]))
     while waiting:
         names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
-        ready = [k for k in waiting if names[_before(recordings[k])] <= continues(recordings[k], recordings[k])]
-        placed = {*(ready or waiting)}  # of those that continue each other in a ring none is the first
+        ready = [k for k in waiting if names[_predecessor(recordings[k])] <= continues(recordings[k], recordings[k])]
+        placed = {*(ready or waiting)}  # in a ring of recordings that continue each other none is the first
         order += [k for k in waiting if k in placed]
         waiting = [k for k in waiting if k not in placed]
     return order
 
 
 def _content(recording: Recording) -> tuple[float, ...]:
-    """How much was recorded, and of what: numbers that keep their order in other units, and of fewer digits."""
+    """Length, duration and mean load and reading: numbers that order recordings alike in any unit."""
     means = (float(np.mean(one.si)) for one in (recording.load, recording.sensor))
     return recording.time_s.size, recording.duration_s, *means
 
 
-def pastless(recordings: Sequence[Recording]) -> list[Recording]:
-    """Recordings that carry on from one that is not among them."""
+def without_predecessor(recordings: Sequence[Recording]) -> list[Recording]:
+    """Recordings that continue one that is not among them."""
     given = [one for one in recordings if "continues" in one.metadata]
     return [one for one in given if not any(continues(one, other) for other in recordings if other is not one)]
 
 
 def continues(later: Recording, earlier: Recording) -> bool:
-    """Whether a recording carries on from another one."""
-    return _before(later) == earlier.name
+    """Whether a recording continues another one."""
+    return _predecessor(later) == earlier.name
 
 
-def _before(recording: Recording) -> str | None:
-    """The name of the recording that one carries on from."""
+def _predecessor(recording: Recording) -> str | None:
+    """The name of the recording that this one continues."""
     return recording.metadata.get("continues")
 
 
 def at_full_rate(
     sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds
 ) -> list[Session]:
-    """The same sessions without thinning: cycles and what is held out as they are."""
-    return _on_one_scale(
+    """The same sessions without thinning, with the same cycles and held-out parts."""
+    return _with_common_temperature_zero(
         [
-            _session(one.recording, one.index, mask, scale, 1, _Past.of(one.conditions), thresholds, one)
+            _session(one.recording, one.index, mask, scale, 1, _History.of(one.conditions), thresholds, one)
             for one, mask in zip(sessions, usable, strict=True)
         ]
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Past:
-    """What recordings that one continues left behind: ``sums`` of theirs, and their ``load`` (n,) each ``step_s``."""
+class _History:
+    """What earlier recordings left to one that continues them: ``sums``, and their ``load`` (n,) every ``step_s``."""
 
     sums: Mapping[str, float] = field(default_factory=dict)
     load: Array = field(default_factory=lambda: np.zeros(0))
     step_s: float = 1.0
 
     @classmethod
-    def of(cls, conditions: Conditions) -> _Past:
-        """What is known under the conditions of one that continues them."""
+    def of(cls, conditions: Conditions) -> _History:
+        """The history that a session's conditions hold."""
         return cls(conditions.before, conditions.earlier, conditions.step_s)
 
     def load_every(self, step_s: float) -> Array:
-        """The load on another step, the last sample a step before what continues it."""
+        """The load on another step; its last sample is one step before the recording that follows."""
         if self.step_s == step_s or not self.load.size:
             return self.load
         count = max(round(self.load.size * self.step_s / step_s), 1)
@@ -239,67 +238,78 @@ def _session(
     usable: Mask,
     scale: Scale,
     factor: int,
-    past: _Past,
+    past: _History,
     thresholds: Thresholds,
-    like: Session | None = None,
+    template: Session | None = None,
 ) -> Session:
+    """The session of one recording, thinned by ``factor``; cycles, held-out parts and noise those of a ``template``."""
     step_s = recording.sample_time_s
     logged = _logged(
-        recording, usable, scale, longest_step_s(recording, factor if like is None else like.thinned), thresholds
+        recording,
+        usable,
+        scale,
+        longest_step_s(recording, factor if template is None else template.thinned),
+        thresholds,
     )
     reading = scale.share(logged.reading)
-    # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
-    weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), reading.size))
-    quiet = like.quiet if like is not None else _quiet(logged.load_n / scale.load_n, reading, step_s, thresholds)
-    rest = _load_at_rest(quiet.load, reading, step_s, scale.unit, thresholds)
-    reach = largest_of_noise(quiet.load.size, thresholds) * quiet.raw
-    beside = {name: smoothed(values, weights, factor) for name, values in logged.beside.items()}
+    # At least so wide that noise of the load is smoothed alike in reading and simulation, whatever the thinning.
+    weights = kernel(1 if template is not None else min(max(factor, LEAST_WINDOW), reading.size))
+    denoised = (
+        template.denoised
+        if template is not None
+        else _denoised_load(logged.load_n / scale.load_n, reading, step_s, thresholds)
+    )
+    rest = _load_at_rest(denoised.load, reading, step_s, scale.unit, thresholds)
+    reach = largest_of_noise(denoised.load.size, thresholds) * denoised.raw_sd
+    auxiliary = {name: smoothed(values, weights, factor) for name, values in logged.auxiliary.items()}
     conditions = Conditions(
         logged.time_s[::factor],
-        smoothed(_rests_levelled(quiet.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
+        smoothed(_with_level_rests(denoised.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
         step_s * factor,
-        quiet.left * float(np.sqrt(np.sum(weights**2))),
-        temperature_k=beside.get("temperature_k"),
-        neighbour=beside.get("neighbour"),
+        denoised.remaining_sd * float(np.sqrt(np.sum(weights**2))),
+        temperature_k=auxiliary.get("temperature_k"),
+        neighbour=auxiliary.get("neighbour"),
         before=past.sums,
         earlier=past.load_every(step_s * factor),
     )
-    there = smoothed(logged.usable.astype(float), weights, factor)
-    # A reading that is logged at a part of the load's rate never fills a window.
-    usual = float(np.median(there[there > 0.0])) if logged.usable.any() else 1.0
+    coverage = smoothed(logged.usable.astype(float), weights, factor)
+    # A reading that is logged at a fraction of the load's rate never fills a window.
+    typical_coverage = float(np.median(coverage[coverage > 0.0])) if logged.usable.any() else 1.0
     load = conditions.load
-    if like is None:
+    if template is None:
         held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions, thresholds)
     else:
-        nearest = np.minimum((np.arange(load.size) + like.thinned // 2) // like.thinned, like.cycle.size - 1)
-        held_out, cycle = like.held_out[nearest], like.cycle[nearest]
+        nearest = np.minimum(
+            (np.arange(load.size) + template.thinned // 2) // template.thinned, template.cycle.size - 1
+        )
+        held_out, cycle = template.held_out[nearest], template.cycle[nearest]
     return Session(
         recording,
         index,
         conditions,
         smoothed(reading, weights, factor),
-        there > 0.7 * usual,
+        coverage > 0.7 * typical_coverage,
         held_out,
         cycle,
         np.abs(load - rest) < thresholds.standing,
         factor,
-        quiet,
+        denoised,
         gap_ends=tuple(
             int(end) // factor
             for begin, end in zip(*runs_of(~logged.load_known), strict=True)
             if begin > 0 and end < logged.load_known.size and (end - begin) * step_s > thresholds.settled_s
         ),
         unknown_past=thresholds.unknown_past,
-        white_sd=like.white_sd if like is not None else noise_sd(reading, thresholds),
+        white_sd=template.white_sd if template is not None else noise_sd(reading, thresholds),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Logged:
-    """A recording on an even grid, (n,) each, bridged where samples are missing; ``reading`` in the scale's unit.
+    """A recording on an even grid, (n,) each, interpolated where samples are missing; ``reading`` in the scale's unit.
 
-    ``usable``: where load and reading are there and sound; ``load_known``: where the load is. ``beside``: temperature
-    and neighbour, as conditions have them, where they were logged.
+    ``usable``: load and reading are present and sound. ``load_known``: the load is present. ``auxiliary``: temperature
+    and neighbour, where they were logged.
     """
 
     time_s: Array
@@ -307,23 +317,24 @@ class _Logged:
     reading: Array
     usable: Mask
     load_known: Mask
-    beside: dict[str, Array]
+    auxiliary: dict[str, Array]
 
 
 def longest_step_s(recording: Recording, factor: int) -> float:
-    """How far samples may be apart for fits of a recording thinned by a ``factor``, in which the average is as wide."""
-    return (max(factor, LEAST_WINDOW) + 0.5) * recording.sample_time_s  # half a sample, since stamps are rounded
+    """The longest step in s that a fit can follow in a recording thinned by ``factor``: the width of its average."""
+    return (max(factor, LEAST_WINDOW) + 0.5) * recording.sample_time_s  # half a sample more, since stamps are rounded
 
 
 def _logged(recording: Recording, usable: Mask, scale: Scale, longest_s: float, thresholds: Thresholds) -> _Logged:
+    """The recording on an even grid; samples are usable up to ``longest_s`` apart."""
     time_s, step_s = recording.time_s - recording.time_s[0], recording.sample_time_s
     known = recording.load.present
     good = usable & recording.sensor.present & known
     reading = bridged(time_s, reading_in(recording, scale.unit), good)
     load_n = bridged(time_s, recording.force_n, known)
-    beside = _logged_beside(recording, time_s, scale)
+    auxiliary = _auxiliary_channels(recording, time_s, scale)
     if recording.is_uniform:
-        return _Logged(time_s, load_n, reading, good, known, beside)
+        return _Logged(time_s, load_n, reading, good, known, auxiliary)
     even = np.asarray(step_s * np.arange(int(time_s[-1] / step_s) + 1), dtype=np.float64)
     nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
     is_near = np.abs(time_s[nearest] - even) < step_s
@@ -335,29 +346,29 @@ def _logged(recording: Recording, usable: Mask, scale: Scale, longest_s: float, 
         np.interp(even, time_s, reading),
         good,
         known,
-        {name: np.interp(even, time_s, values) for name, values in beside.items()},
+        {name: np.interp(even, time_s, values) for name, values in auxiliary.items()},
     )
 
 
 def _load_at_rest(load: Array, reading: Array, step_s: float, unit: Unit, thresholds: Thresholds) -> float:
-    """The load (n,) that a cell shows of an unloaded unit: its lowest, or what stands still, or its tare."""
+    """The load that the cell shows of an unloaded unit, as its tare: the lowest one, or the first if it begins so."""
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     if unit.quantity == "pressure" and begins_unloaded(load, reading, step_s, thresholds):
         return min(low, float(load[0]))
     return min(low, thresholds.standing)
 
 
-def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> Quiet:
-    raw = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
-    quiet, left = without_noise(load, step_s, raw, thresholds)
-    return Quiet(as_sampled(quiet, reading, step_s, thresholds), raw, left)
+def _denoised_load(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> DenoisedLoad:
+    """The load (n,) without noise and with the reading's sampling jitter, both in shares of full scale."""
+    raw_sd = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
+    denoised, remaining_sd = without_noise(load, step_s, raw_sd, thresholds)
+    return DenoisedLoad(with_sampling_jitter(denoised, reading, step_s, thresholds), raw_sd, remaining_sd)
 
 
 def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> bool:
-    """Whether a recording begins at a load (n,) of which its gauge (n,) reads next to nothing: the load cell's tare.
+    """Whether a recording begins with a load (n,) at which its gauge (n,) reads almost nothing, so that it is a tare.
 
-    A unit is pressed only: where load and reading fall clearly below that later, it began loaded, and its gauge was set
-    to zero there.
+    Not where load and reading both fall clearly below that later: then it began loaded, with a gauge zeroed there.
     """
     first = slice(0, max(1, round(thresholds.settled_s / step_s)))
     begun, read = (float(one[first].mean()) for one in (load, reading))
@@ -367,8 +378,8 @@ def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thre
     return fall < thresholds.standing
 
 
-def _rests_levelled(load: Array, level: float, reach: float) -> Array:
-    """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise, up to ``reach``."""
+def _with_level_rests(load: Array, level: float, reach: float) -> Array:
+    """``load`` with each rest at its mean, up to ``reach``: an unloaded unit does not feel the load cell's noise."""
     out = load.copy()
     for first, last in zip(*runs_of(load < level), strict=True):
         part = load[first:last]
@@ -380,7 +391,7 @@ def _rests_levelled(load: Array, level: float, reach: float) -> Array:
 
 
 def kernel(factor: int) -> Array:
-    """A Hann window over two thinned steps: weights of a zero-phase average, sum one."""
+    """Weights of a Hann window over two thinned steps: a zero-phase average of sum one."""
     if factor <= 1:
         return np.ones(1)
     window = np.hanning(2 * factor + 1)[1:-1]
@@ -388,7 +399,7 @@ def kernel(factor: int) -> Array:
 
 
 def smoothed(signal: Array, weights: Array, factor: int) -> Array:
-    """(m,) ``signal`` (n,) averaged and thinned; the ends are mirrored through their end points, slope unchanged."""
+    """(m,) ``signal`` (n,) averaged and thinned; ends are mirrored through their end points, which keeps the slope."""
     half = weights.size // 2
     if not half:
         return np.array(signal[::factor], dtype=float)
@@ -397,8 +408,8 @@ def smoothed(signal: Array, weights: Array, factor: int) -> Array:
     return np.convolve(np.concatenate([left, signal, right]), weights, "valid")[::factor]
 
 
-def _logged_beside(recording: Recording, time_s: Array, scale: Scale) -> dict[str, Array]:
-    """Temperature and neighbour (n,), as conditions have them, of which any sample is there."""
+def _auxiliary_channels(recording: Recording, time_s: Array, scale: Scale) -> dict[str, Array]:
+    """Temperature and neighbour (n,) in the units of conditions, where any sample is present."""
     found = {}
     temperature, neighbours = recording.channels.get("temperature"), neighbours_of(recording)
     if temperature is not None and temperature.role == "auxiliary" and temperature.present.any():
@@ -410,16 +421,18 @@ def _logged_beside(recording: Recording, time_s: Array, scale: Scale) -> dict[st
 
 
 def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
-    """How often the load rises in recordings of which anything is fitted."""
+    """The number of rises of the load in fitted recordings."""
     return sum(_rises(session.conditions, thresholds) for session in fitted_of(sessions))
 
 
 def have_later_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
-    """Whether a recording of which anything is fitted holds more than one load cycle."""
+    """Whether any fitted recording holds more than one load cycle."""
     return any(load_cycles([session], thresholds) > 1 for session in sessions)
 
 
 def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
+    """The number of rises of the load; cached in the conditions."""
+
     def count() -> Array:
         load = conditions.load
         return np.array([len(rises_of(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9)))])
@@ -428,10 +441,11 @@ def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
 
 
 def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
+    """(n,) number of the load cycle; of equal parts of the time where there are too few cycles to hold some out."""
     load = conditions.load
-    # Of full scale, or of the record's own span where that is less.
+    # A share of full scale, or of the record's own span where that is smaller.
     threshold = thresholds.cycle * min(1.0, max(float(np.ptp(load)), 1e-9))
-    # A cycle begins at the foot of a rise; the foot of a rest is its last sample at the low level.
+    # A cycle begins at the foot of a rise, after a rest at its last low sample.
     feet = [foot for foot, top in rises_of(load, threshold) if load[top] - load[foot] > threshold]
     starts = []
     for foot in feet:
@@ -440,7 +454,7 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
         while end + 1 < load.size and load[end + 1] <= level:
             end += 1
         starts.append(end)
-    fewest = 2 * thresholds.held_out_every  # so that two are judged
+    fewest = 2 * thresholds.held_out_every  # so that at least two are held out
     if len(starts) < fewest:
         parts = np.arange(load.size) * (2 * fewest) // load.size
         return np.asarray(parts, dtype=np.intp)
@@ -449,7 +463,8 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     return np.cumsum(cycle)
 
 
-def _left_behind(conditions: Conditions, thresholds: Thresholds) -> _Past:
+def _history_after(conditions: Conditions, thresholds: Thresholds) -> _History:
+    """The history that a session leaves to the one that continues it."""
     load = conditions.load
     before = conditions.before
     sums = {
@@ -459,4 +474,4 @@ def _left_behind(conditions: Conditions, thresholds: Thresholds) -> _Past:
         "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
         "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),
     }
-    return _Past(sums, np.concatenate([conditions.earlier, load]), conditions.step_s)
+    return _History(sums, np.concatenate([conditions.earlier, load]), conditions.step_s)

@@ -1,4 +1,4 @@
-"""Stretches that a recording was logged at a lower rate than the rest of it: what of them fits can follow."""
+"""Stretches logged at a lower rate than the rest of a recording, and which samples of them fits can follow."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from smartshoe.signals.masks import runs_of
 
 @dataclass(frozen=True, eq=False)
 class Spacing:
-    """Moments (m,) between samples: the next sample ``after`` each, and of the two about it whether they are close.
+    """For moments (m,): the next sample ``after`` each, and the distance of the two samples around it.
 
-    ``is_close``: near enough for fits to follow. ``is_even``: as far apart as those about them, else it is in a gap.
+    ``is_close``: close enough for fits to follow. ``is_even``: as far apart as those nearby, so that there is no gap.
     """
 
     after: Index
@@ -29,27 +29,28 @@ class Spacing:
         return self._between(good) & self.is_close
 
     def too_slow(self, good: Mask) -> Mask:
-        """(m,) moments between two ``good`` samples (n,) that are too far apart for that."""
+        """(m,) moments between two ``good`` samples (n,) that are too far apart."""
         return self._between(good) & ~self.is_close
 
     def _between(self, good: Mask) -> Mask:
+        """(m,) moments between two ``good`` samples (n,) that are not in a gap."""
         return self.is_even & good[self.after] & good[self.after - 1]
 
 
 def spacing_of(time_s: Array, at_s: Array, longest_s: float, thresholds: Thresholds) -> Spacing:
-    """How samples at ``time_s`` (n,) lie about moments ``at_s`` (m,), close where no more than ``longest_s`` apart."""
+    """The spacing of samples at ``time_s`` (n,) around moments ``at_s`` (m,); close is up to ``longest_s`` apart."""
     from scipy.ndimage import maximum_filter1d, median_filter
 
     step_s = np.diff(time_s)
-    # To where a rate changes it is that of the slower side.
+    # Up to where a rate changes, the slower rate counts.
     usual_s = maximum_filter1d(median_filter(step_s, thresholds.local, mode="nearest"), thresholds.local + 1)
     is_even = step_s <= (1.0 + thresholds.same) * usual_s
     after = np.clip(np.searchsorted(time_s, at_s), 1, time_s.size - 1)
     return Spacing(after, is_even[after - 1] & (at_s <= time_s[-1]), step_s[after - 1] <= longest_s)
 
 
-def too_slow_of(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> str | None:
-    """What is said of stretches of a recording whose samples are farther apart than ``longest_s``, or None."""
+def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> str | None:
+    """The sentence on stretches whose samples are more than ``longest_s`` apart, or None."""
     if recording.is_uniform:
         return None
     time_s, step_s = recording.time_s, recording.sample_time_s

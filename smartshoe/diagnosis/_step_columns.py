@@ -1,4 +1,4 @@
-"""Steps at moments of a session: what begins there and stays, without a column of samples for each."""
+"""Steps at moments of a session: contributions that start there and stay, without a column of samples for each."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from smartshoe.diagnosis._session import Session
 
 @dataclass(frozen=True, eq=False)
 class StepColumns:
-    """What a session's ``by`` (n,) adds from each of ``starts`` (k,) on, both counted over what is fitted."""
+    """Steps of size ``by`` (n,) from each of ``starts`` (k,) on, both over the fitted samples."""
 
     by: Array
     starts: Index
 
     @classmethod
     def of(cls, session: Session, by: Array, moments: Index) -> StepColumns:
-        """``by`` (n,) and ``moments`` (k,) of all samples, in order."""
+        """From ``by`` (n,) and ordered ``moments`` (k,), both over all samples."""
         return cls(by[session.fitted], np.searchsorted(np.flatnonzero(session.fitted), moments))
 
     def products(self, columns: Array) -> Array:

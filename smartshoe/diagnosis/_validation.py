@@ -1,4 +1,4 @@
-"""What an effect is worth within what is fitted: recordings left out in turn, loads beyond those that were fitted."""
+"""Cross-validation within the fitted data, and effects that act mainly beyond it or cancel one another."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
-MOST_FOLDS = 6  # of a single recording and of many, a resolution
-MOST_ALONE = 2 * MOST_FOLDS  # recordings that are left out one at a time
-OWN_STEPS = 2  # of an effect's own parameters, from where all recordings have them
+MOST_FOLDS = 6  # of one recording or of many, a resolution
+MOST_ALONE = 2 * MOST_FOLDS  # up to so many recordings each is left out by itself
+OWN_STEPS = 2  # of an effect's own parameters, which start from the fit to all recordings
 
 
 class LeftOut:
-    """Each fitted recording in turn, predicted by fits to the others; of a single one, its load cycles in blocks.
+    """Each fitted recording in turn, predicted by fits to the others; of a single recording, its load cycles in blocks.
 
-    Many recordings are left out in groups, so that six fits do; the errors are still those of each recording.
-    A fit begins where that of all of them ended, so that few steps lead to its end.
+    Many recordings are left out in groups, so that six fits suffice; errors are still per recording. Each fit starts
+    where the fit to all of them ended, so that few steps are needed.
 
-    Of two recordings, each of several load cycles, a model may also foresee the same third of both: neither need hold
-    what the other shows, a rate or a peak, so that the one would have to foretell what only the other can tell. Not
-    where ``is_apart``, since what differs between recordings is asked for.
+    Two recordings of several load cycles each may also be judged by leaving out the same third of both. Either may hold
+    a rate or a peak that the other lacks, so that the one cannot predict the other. Not with ``by_recording``: there
+    the question is what differs between recordings.
     """
 
     def __init__(
@@ -38,42 +38,42 @@ class LeftOut:
         like: ExtendedModel,
         thresholds: Thresholds,
         *,
-        is_apart: bool = False,
+        by_recording: bool = False,
     ) -> None:
         self.sessions, self.thresholds = sessions, thresholds
-        thirds = [] if is_apart else thirds_of(sessions, thresholds)
-        self._ways = [
+        thirds = [] if by_recording else thirds_of(sessions, thresholds)
+        self._schemes = [
             (folds, [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in folds])
             for folds in (folds_of(sessions), thirds)
             if folds
         ]
         self._errors: dict[tuple[ExtendedModel, int], Array] = {}
 
-    def errors(self, model: ExtendedModel, way: int = -1) -> Array:
-        """(recordings or blocks,) squared errors of what is left out, one ``way`` or the other; cached."""
-        way %= len(self._ways)
-        if (model, way) not in self._errors:
-            (folds, rests), start = self._ways[way], within_bounds(model)
+    def errors(self, model: ExtendedModel, scheme: int = -1) -> Array:
+        """(recordings or blocks,) squared errors of what is left out, by one ``scheme`` (default the last); cached."""
+        scheme %= len(self._schemes)
+        if (model, scheme) not in self._errors:
+            (folds, rests), start = self._schemes[scheme], within_bounds(model)
             rows = self._rows_of(start)
             models = [fit(rest, start, FEW_STEPS, rows(rest)).model for rest in rests]
-            self._errors[model, way] = _squares(folds, models)
-        return self._errors[model, way]
+            self._errors[model, scheme] = _squares(folds, models)
+        return self._errors[model, scheme]
 
-    def following(self, found: Fit) -> Fit:
-        """``found``, fitted again without the effects that are not the same in what is left out.
+    def consistent(self, found: Fit) -> Fit:
+        """``found``, refitted without the effects whose parameters do not hold for what is left out.
 
-        Each effect's parameters are found without a recording, all else as all of them together ask. Its gain there,
-        over a fit without it, must lie above zero by most of a standard error, or, where recordings can be left out by
-        thirds, lie above zero in every one of these: the law of what counts cycles may differ between few long ones and
-        many short ones, and is the same in each third of both. Of several of which neither holds, and which may stand
-        in for one another, that one goes that gains least.
+        Each effect's own parameters are fitted without a recording, all else being as fitted to all of them. Its gain
+        there over a fit without it must be positive by most of a standard error (``validated``). Where thirds can be
+        left out, it suffices that it is positive in each third: a law that counts cycles may differ between few long
+        and many short ones, but is the same in each third of both. Of several effects that fail, which may replace one
+        another, the one with the smallest gain is removed first.
         """
         failing = list(found.model.names)
         while failing:
             start = within_bounds(found.model)
             rows, gains, less = self._rows_of(start), {}, {}
             for name in failing:
-                less[name] = fit(found.likelihood, start.without(name), beside=found.cost)
+                less[name] = fit(found.likelihood, start.without(name), best_cost=found.cost)
                 gains[name] = self._gains(name, start, less[name].model, rows)
             failing = [name for name in failing if not self._is_same(gains[name])]
             if failing:
@@ -83,15 +83,18 @@ class LeftOut:
         return found
 
     def _is_same(self, gains: Sequence[Array]) -> bool:
-        apart, *thirds = gains
-        return _in_standard_errors(apart) >= self.thresholds.validated or any(bool((one > 0.0).all()) for one in thirds)
+        """Whether an effect's ``gains``, by recordings and then by thirds, show that it holds for what is left out."""
+        by_recording, *thirds = gains
+        return _in_standard_errors(by_recording) >= self.thresholds.validated or any(
+            bool((one > 0.0).all()) for one in thirds
+        )
 
     def _gains(
         self, name: str, start: ExtendedModel, less: ExtendedModel, rows: Callable[[Likelihood], list[Array]]
     ) -> list[Array]:
-        """(recordings or blocks,) gains over ``less``, which lacks the effect; by thirds where these decide."""
+        """(recordings or blocks,) gains over ``less``, which lacks the effect; by thirds as well where these decide."""
         gains: list[Array] = []
-        for folds, rests in self._ways:
+        for folds, rests in self._schemes:
             own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in rests]
             gains.append(_squares(folds, [less] * len(own)) - _squares(folds, own))
             if self._is_same(gains):
@@ -99,30 +102,30 @@ class LeftOut:
         return gains
 
     def _rows_of(self, start: ExtendedModel) -> Callable[[Likelihood], list[Array]]:
-        """What all fits begin with, of those recordings that one of them is fitted to."""
+        """Residuals and slopes at the start of a fit, for the recordings that a likelihood is fitted to."""
         rows = {id(one.conditions): rows_of(start, one) for one in fitted_of(self.sessions)}
         return lambda rest: [rows[id(one.conditions)] for one in rest.sessions]
 
-    def stands(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
-        """Whether ``model`` does away with enough of the plain model's squared error where recordings are left out.
+    def is_validated(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
+        """Whether ``model`` removes enough of the plain model's squared error where data is left out.
 
-        With `foreseen` of it, and with nearly the share that it does away with where it was fitted: what fits by
-        chance, or only these loads, does not. Where it follows what was fitted as nearly as a law does, the former is
-        enough: fewer recordings may not hold all that an effect needs, and what is wrong follows all of them less well.
+        At least the share `foreseen`, and nearly the share that it removes where it was fitted, since a chance fit does
+        not. Where it follows the fitted data nearly as well as a law does, the former suffices: fewer recordings may
+        lack what an effect needs.
         """
         fitted = 1.0 - (error_of(self.sessions, model) / max(error_of(self.sessions, plain), 1e-300)) ** 2
-        given = self.thresholds
-        nearly = (1.0 - given.same) * fitted if fitted < 1.0 - given.law_departure**2 else 0.0
+        thresholds = self.thresholds
+        nearly = (1.0 - thresholds.same) * fitted if fitted < 1.0 - thresholds.law_departure**2 else 0.0
         left_out = (
             1.0 - float(self.errors(model, way).sum()) / max(float(self.errors(plain, way).sum()), 1e-300)
-            for way in range(len(self._ways))
+            for way in range(len(self._schemes))
         )
-        return any(share >= max(given.foreseen, nearly) for share in left_out)
+        return any(share >= max(thresholds.foreseen, nearly) for share in left_out)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fold:
-    """``rest`` is fitted, samples (n,) of recordings ``left_out`` predicted, whose offset and past stay their own."""
+    """The sessions to fit (``rest``) and the samples (n,) of recordings ``left_out``, which keep their own terms."""
 
     rest: list[Session]
     left_out: list[tuple[Session, Mask]]
@@ -131,8 +134,8 @@ class _Fold:
 def _squares(folds: Sequence[_Fold], models: Sequence[ExtendedModel]) -> Array:
     """(recordings or blocks,) squared errors of what each fold leaves out, by its model.
 
-    What is left out together shares a fit, whose own error moves their gains in the second order only: each of them
-    counts in a standard error.
+    Recordings left out together share a fit. Its error affects their gains in second order only, so that each counts in
+    a standard error.
     """
     left = [
         residual_of(session, model)[mask]
@@ -143,7 +146,7 @@ def _squares(folds: Sequence[_Fold], models: Sequence[ExtendedModel]) -> Array:
 
 
 def thirds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
-    """Of two recordings, each of several load cycles, the same third of both in turn; nothing of any others."""
+    """The folds that leave the same third of two recordings out, each with enough cycles; none for other numbers."""
     fitted = fitted_of(sessions)
     several = thresholds.held_out_every
     if len(fitted) == 2 and all(load_cycles([one], thresholds) >= several for one in fitted):
@@ -152,11 +155,11 @@ def thirds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold
 
 
 def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
-    """What is left out in turn: recordings, or cycles of a single one where they are fitted.
+    """What is left out in turn: recordings, or blocks of cycles of a single one.
 
-    Many recordings are dealt out to groups, there and back. Neighbours, which a loading rate or a day often has in
-    common, come into different groups, and so do those of a protocol that comes round with every sixth: no group takes
-    all of a kind away.
+    Many recordings are dealt to groups in order, forwards and then backwards. Neighbours, which often share a loading
+    rate or a day, come into different groups, and so do every sixth ones of a protocol: no group takes all of a kind
+    away.
     """
     fitted = fitted_of(sessions)
     if len(fitted) > 1:
@@ -173,7 +176,7 @@ def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
 
 
 def _blocks_of(fitted: Sequence[Session], count: int) -> list[_Fold]:
-    """So many blocks of the load cycles of each recording, the same one of all left out."""
+    """Folds that leave out one of ``count`` blocks of the load cycles, the same block of each recording."""
     blocks = [np.array_split(np.unique(one.cycle[one.fitted]), count) for one in fitted]
     folds = []
     for cycles in zip(*blocks, strict=True):
@@ -185,61 +188,63 @@ def _blocks_of(fitted: Sequence[Session], count: int) -> list[_Fold]:
     return folds
 
 
-def extrapolating(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
-    """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide.
+def extrapolating_effect(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
+    """An effect that moves unfitted recordings far more than fitted ones, or None; only their loads decide.
 
-    It is none where it is so large where it was fitted that a small imperfection of the unit, taken for it, is no more
-    than its own equation may be wrong by.
+    An effect that is large where it was fitted is none: a small imperfection mistaken for it is within the error of its
+    equation.
     """
     whole = [model.simulate(one.conditions) for one in sessions]
     for part in model.parts:
-        by = _moved(sessions, whole, model.without(part.name))
-        within = _spread(by, [one.fitted for one in sessions])
+        by = _contributions(sessions, whole, model.without(part.name))
+        within = _centred_rms(by, [one.fitted for one in sessions])
         if thresholds.departure * within >= thresholds.imperfection:
             continue
-        if _spread(by, [one.judged for one in sessions]) > thresholds.extrapolates * max(within, thresholds.material):
+        if _centred_rms(by, [one.judged for one in sessions]) > thresholds.extrapolates * max(
+            within, thresholds.material
+        ):
             return part.name
     return None
 
 
-def cancelling(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> list[str]:
-    """Effects that undo each other: each moves the reading by more than all of them do together, or nearly so.
+def cancelling_effects(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> list[str]:
+    """Effects that cancel one another: each moves the reading by at least nearly as much as all of them together.
 
-    Powers of independent effects add up to that of all; where they are clear of it, most of what the effects do is
-    undone by one another, and they fit by their difference, which is neither's.
+    Powers of independent effects add up to that of their sum. Where they clearly exceed it the effects fit by their
+    difference, which is neither's.
     """
     seen = [one.fitted for one in sessions]
     whole = [model.simulate(one.conditions) for one in sessions]
-    sizes = {name: _spread(_moved(sessions, whole, model.without(name)), seen) for name in model.names}
-    together = _spread(_moved(sessions, whole, replace(model, parts=())), seen)
+    sizes = {name: _centred_rms(_contributions(sessions, whole, model.without(name)), seen) for name in model.names}
+    together = _centred_rms(_contributions(sessions, whole, replace(model, parts=())), seen)
     if sum(size**2 for size in sizes.values()) <= thresholds.clear * together**2:
         return []
     return [name for name, size in sizes.items() if size > (1.0 - thresholds.same) * together]
 
 
 def error_of(sessions: Sequence[Session], model: ExtendedModel) -> float:
-    """Rms of what is left of what is fitted."""
+    """Rms of the residual over the fitted samples, a share of full scale."""
     return fitted_rms(sessions, [residual_of(session, model) for session in sessions])
 
 
-def apart(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
-    """Rms of the difference of two models' readings over what is fitted, each recording's own offset aside."""
+def rms_difference(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
+    """Rms difference of two models' readings over the fitted samples, each recording's own terms aside."""
     return fitted_rms(sessions, [residual_of(session, first) - residual_of(session, second) for session in sessions])
 
 
-def _moved(sessions: Sequence[Session], whole: Sequence[Array], less: ExtendedModel) -> list[Array]:
-    """By how much the readings ``whole``, (n,) each, lie beside those of a model that lacks something."""
+def _contributions(sessions: Sequence[Session], whole: Sequence[Array], less: ExtendedModel) -> list[Array]:
+    """(n,) for each session: by how much its reading ``whole`` exceeds that of a model that lacks something."""
     return [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
 
 
-def _spread(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
-    """Rms of ``signals``, (n,) each, where ``seen``, each about its own mean."""
+def _centred_rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
+    """Rms of ``signals`` (n,) over the samples ``seen``, each about its own mean."""
     parts = [signal[mask] - signal[mask].mean() for signal, mask in zip(signals, seen, strict=True) if mask.any()]
     return math.sqrt(sum(float(one @ one) for one in parts) / max(sum(one.size for one in parts), 1))
 
 
 def fitted_rms(sessions: Sequence[Session], signals: Sequence[Array]) -> float:
-    """Rms of ``signals``, (n,) a session, over what is fitted."""
+    """Rms of ``signals``, (n,) for each session, over the fitted samples."""
     square, count = 0.0, 0
     for session, signal in zip(sessions, signals, strict=True):
         fitted = signal[session.fitted]
@@ -249,6 +254,6 @@ def fitted_rms(sessions: Sequence[Session], signals: Sequence[Array]) -> float:
 
 
 def _in_standard_errors(gains: Array) -> float:
-    """The mean of ``gains`` (n,) over its standard error."""
+    """The mean of ``gains`` (n,) in its standard errors."""
     error = float(np.std(gains, ddof=1)) / math.sqrt(gains.size) if gains.size > 1 else 0.0
     return float(gains.mean()) / max(error, 1e-300)

@@ -1,4 +1,4 @@
-"""The verdict, and the sentence that says it: size before judgement."""
+"""The verdict, and the sentence that states it."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import listed
 
 
-def known_error(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
-    """Rms, shares of full scale, that faults of all samples add to a recording that is fitted, the most of all."""
+def fault_rms(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
+    """The largest rms error, a share of full scale, that data faults add to all samples of a fitted recording."""
     units = {one.index: one.recording.sensor.unit for one in fitted_of(sessions)}
     errors = (fault.error * units[fault.recording].scale for fault in faults if fault.recording in units)
     return max(errors, default=0.0) / (abs(scale.reading) * scale.unit.scale)
 
 
 def unexplained_of(causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure) -> ResidualStructure:
-    """What no cause accounts for: ``after`` them, or all that was ``before`` where effects have no name."""
+    """The structure that no cause accounts for: ``after`` the effects, or ``before`` them where none has a name."""
     return before if not causes and before.rms > after.rms else after
 
 
@@ -37,42 +37,38 @@ def verdict_of(
     before: ResidualStructure,
     after: ResidualStructure,
     thresholds: Thresholds,
-    follows: bool = True,
-    known: float = 0.0,
+    is_lawful: bool = True,
+    fault_error: float = 0.0,
     *,
     worse: bool = False,
     elsewhere: float = 0.0,
 ) -> Verdict:
-    """What is left, against what was wrong ``before`` and what is tolerable.
+    """The verdict, from the structure left against that ``before`` and against what is tolerable.
 
-    ``worse``: that the extension is so on what is held out, for certain or by more than what is tolerable: whatever it
-    follows, it explains a part.
-    ``elsewhere``: `off_elsewhere`, or what an effect moves that is followed, but of no kind that has a name, or what
-    effects without names do away with.
-
-    ``follows``: one cause is sure and all have laws, so that what is left may be what laws usually depart by.
-
-    ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
+    ``is_lawful``: a cause is sure and all have laws, so that what is left may be what laws usually depart by.
+    ``fault_error`` is the rms of data faults, below which nothing is seen. ``worse``: the extension is worse on
+    held-out data, for certain or by more than is tolerable. ``elsewhere`` is the `held_out_excess`, or the size of
+    effects that are followed but have no name.
     """
     left = unexplained_of(causes, before, after).rms
-    least = max(thresholds.material, thresholds.tolerable, known)
+    tolerated = max(thresholds.material, thresholds.tolerable, fault_error)
     if causes:
-        least = max(least, thresholds.departure * before.rms if follows else 0.0)
-        return "partly_explained" if left > least or worse or elsewhere else "explained"
-    return "unexplained" if left > least or elsewhere else "adequate"
+        tolerated = max(tolerated, thresholds.departure * before.rms if is_lawful else 0.0)
+        return "partly_explained" if left > tolerated or worse or elsewhere else "explained"
+    return "unexplained" if left > tolerated or elsewhere else "adequate"
 
 
-def off_elsewhere(
+def held_out_excess(
     sessions: Sequence[Session], residuals: Sequence[Array], within: float, thresholds: Thresholds
 ) -> float:
-    """Rms beyond white noise of recordings that were not fitted, 0 where it is as what was fitted is off by.
+    """Rms beyond white noise of recordings that were not fitted; 0 where they are not clearly worse than others.
 
-    ``within`` is that of what was fitted. What is off by `clear` of it, and of what is tolerable, is of another unit or
-    of loads of which nothing was learnt.
+    ``within`` is the rms of the fitted ones. A recording that exceeds it by `clear`, and what is tolerable, is of
+    another unit, or of loads that were not learnt.
     """
-    apart = [(one, left) for one, left in zip(sessions, residuals, strict=True) if one.held_out.all()]
-    off = beyond_noise(all_fitted([one for one, _ in apart]), [left for _, left in apart], thresholds)
-    seen = np.concatenate([left[one.usable] for one, left in apart]) if apart else np.zeros(1)
+    unfitted = [(one, residual) for one, residual in zip(sessions, residuals, strict=True) if one.held_out.all()]
+    off = beyond_noise(all_fitted([one for one, _ in unfitted]), [residual for _, residual in unfitted], thresholds)
+    seen = np.concatenate([residual[one.usable] for one, residual in unfitted]) if unfitted else np.zeros(1)
     white = float(seen @ seen) / max(seen.size, 1) - off**2
     chance = largest_of_noise(1, thresholds) * math.sqrt(2.0 / max(seen.size, 1)) * white
     is_off = off > thresholds.clear * max(within, thresholds.tolerable) and off**2 > chance
@@ -80,42 +76,44 @@ def off_elsewhere(
 
 
 def names_in(causes: Sequence[Cause], unnamed: int) -> str:
-    """The causes as "a, b and perhaps c", and how many effects of the extended model are none."""
+    """The causes as "a, b and perhaps c", with the number of effects that have no name."""
     names = [cause.name for cause in causes if cause.confidence >= 0.5]
     names += [f"perhaps {cause.name}" for cause in causes if cause.confidence < 0.5]
     names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
     return listed(names, "and")
 
 
-def not_shown_to_be_noise(
+def untested_rms(
     sessions: Sequence[Session],
     residuals: Sequence[Array],
     left: ResidualStructure,
     thresholds: Thresholds,
-    known: float = 0.0,
+    fault_error: float = 0.0,
     before: Sequence[Array] | None = None,
 ) -> float:
-    """Rms beyond white noise of all that can be used, where too little is there to test it.
+    """Rms beyond white noise of all usable data, where there is too little of it for a test of structure.
 
-    0 where it is tolerable, or no more than what is ``known`` to be a fault's of the data, or than laws depart by of
-    what was wrong ``before`` their causes, residuals as well.
+    0 where that is tolerable, explained by data faults (``fault_error``), or within the usual departure of what was
+    wrong ``before`` the causes (residuals (n,) of each recording).
     """
     every = all_fitted(sessions)
     size = beyond_noise(every, residuals, thresholds)
     expected = 0.0 if before is None else thresholds.departure * beyond_noise(every, before, thresholds)
-    return 0.0 if left.is_noise or size <= max(thresholds.tolerable, known, expected) else size
+    return 0.0 if left.is_noise or size <= max(thresholds.tolerable, fault_error, expected) else size
 
 
-def left_where_judged(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:
-    """Rms beyond white noise of what is held out: the most that a better model could do away with there."""
+def held_out_rms(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:
+    """Rms beyond white noise of held-out data: the most that a better model could remove there."""
     judged = [replace(one, usable=one.judged) for one in sessions]
     return beyond_noise(all_fitted(judged), residuals, thresholds)
 
 
-def not_explained_of(rest: ResidualStructure, elsewhere: float, unproven: float, thresholds: Thresholds) -> str | None:
-    """What is said of the ``rest`` that no cause accounts for, or of what is more; None of nothing.
+def unexplained_remark(
+    rest: ResidualStructure, elsewhere: float, unproven: float, thresholds: Thresholds
+) -> str | None:
+    """The sentence on what is not explained, or None.
 
-    ``elsewhere`` is that of `off_elsewhere`, ``unproven`` of `not_shown_to_be_noise`.
+    ``rest`` is structure without a cause, ``elsewhere`` the `held_out_excess`, ``unproven`` the `untested_rms`.
     """
     if unproven > max(rest.rms, elsewhere):
         return f"{percent(unproven)} is left, of which nothing shows that it is noise"
@@ -137,10 +135,10 @@ def sentence_of(
     worse: bool = False,
     withheld: bool = False,
 ) -> str:
-    """The answer in a sentence: size before judgement.
+    """The answer in one sentence: sizes first, then the judgement.
 
-    ``named``: what is in the extended model, as `names_in` says it. ``not_explained``: that of `not_explained_of`.
-    ``withheld``: its limits say why no cause may be named.
+    ``named`` are the causes by `names_in`, ``not_explained`` the `unexplained_remark`. ``withheld``: the limits say why
+    no cause may be named.
     """
     good = f"the baseline simulation is good to {percent(baseline.rmse)} of full scale on data it was not fitted to"
     if baseline.is_empty:
@@ -156,7 +154,7 @@ def sentence_of(
         return f"{good}{left}, and {why or 'no effect of the catalogue accounts for it'}"
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
-    elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong
+    elif best.rmse == baseline.rmse:  # the causes are nothing that the baseline gets wrong
         said = f"{good}, the recordings' own zeros allowed for; found in these: {named}"
     elif worse or best.rmse > baseline.rmse:
         how = "worse" if worse else "no better"

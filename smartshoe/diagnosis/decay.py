@@ -1,7 +1,7 @@
-"""A reading that falls while no load is logged, or while the load stands still: how fast, and by which law.
+"""A reading that falls while no load is logged, or while the load is still: how fast, and by which law.
 
-No cause can be named there: a leak, a relaxing wall and a load that is taken away look alike. What can be said is the
-time constant, how much is lost, and whether one exponential describes it.
+No cause can be named: a leak, a relaxing wall and a load that is removed look alike. What can be given is the time
+constant, how much is lost, and whether one exponential describes it.
 """
 
 from __future__ import annotations
@@ -22,15 +22,14 @@ Course = Literal["exponential", "slower", "faster", "undecided"]
 
 @dataclass(frozen=True, slots=True)
 class Decay:
-    """What `decay_of` found.
+    """The result of `decay_of`.
 
     From ``onset_s`` (since the first sample) the reading falls by ``lost_percent`` of its first level in ``within_s``,
-    with the time constant ``tau_s`` of one exponential (``ci95_s``), towards ``plateau`` (reading's unit; 0 unless the
-    data shows another). ``from_start_s`` is the time constant when the stretch before the onset is counted in, but for
-    one in which the reading had still to rise.
-    ``order`` m (``order_ci95``): the rate of fall goes with the m-th power of the reading, as in -p' = k p^m: 1 is
-    exponential, 1/2 an orifice with incompressible flow, up to 2 a narrow channel with gas far above the ambient
-    pressure; None where too little is lost. ``course`` is the verdict on it, ``says`` all of it in a sentence.
+    with the time constant ``tau_s`` of one exponential (``ci95_s``), towards ``plateau`` (in the reading's unit; 0
+    unless the data shows another). ``from_start_s`` is the time constant with the stretch before the onset included,
+    except for a first rise. ``order`` m (``order_ci95``): the rate of fall goes with the m-th power of the reading, -p'
+    = k p^m. 1 is exponential, 1/2 an orifice with incompressible flow, up to 2 a narrow channel with gas far above
+    ambient pressure; None where too little is lost. ``course`` is the verdict on it, ``says`` all of it in a sentence.
     """
 
     onset_s: float
@@ -47,7 +46,7 @@ class Decay:
 
 
 def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Decay | None:
-    """The decay of the first sensor's reading, or None: the load moves, or the reading does not fall steadily."""
+    """The decay of the first sensor's reading; None if the load moves, or the reading does not fall steadily."""
     thresholds = thresholds or Thresholds()
     standing = _load_stands_still(recording, thresholds.standing)
     if standing is None or not recording.sensors:
@@ -56,7 +55,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
     present = sensor.present
     if present.sum() < thresholds.least_samples:
         return None
-    points = thresholds.bins // 8  # a smooth fall has no detail
+    points = thresholds.bins // 8  # a smooth fall needs few points
     time_s, reading, sign = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present], points)
     noise = largest_of_noise(reading.size, thresholds) * white_noise_sd(reading)
     end = max(time_s.size // 20, 3)
@@ -68,7 +67,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
         return None
     slight = thresholds.clear * thresholds.standing
     begun = np.flatnonzero(reading < high - max(thresholds.standing * (high - low), noise))
-    # A decay of which hardly anything is seen is a straight line, without a corner to begin at.
+    # A decay of which little is seen is a straight line, without a corner at its start.
     first = max(int(begun[0]) - 1, 0) if begun.size and high - low > slight * high else 0
     if time_s.size - first < thresholds.local // 4:
         return None
@@ -88,7 +87,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
             one, plateau = towards, sign * float(towards.at[2])
             ordered = _fit(_of_order, t, v - one.at[2], [high - float(one.at[2]), float(one.at[1]), 1.05])
         half = NORMAL_95 * float(ordered.sd[2])
-        if half < thresholds.same:  # else too little of the curve is seen
+        if half < thresholds.same:  # else too little of the curve is seen to tell its law
             order = float(ordered.at[2])
             order_ci95 = (order - half, order + half)
             apart = abs(order - 1.0) > max(half, slight)
@@ -112,6 +111,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
 
 
 def _load_stands_still(recording: Recording, standing: float) -> Literal["absent", "still"] | None:
+    """Whether the load is "absent" or "still", within ``standing`` of its size; None where it moves."""
     loads = recording.of_role("load")
     if not loads:
         return "absent"
@@ -123,7 +123,7 @@ def _load_stands_still(recording: Recording, standing: float) -> Literal["absent
 
 
 def _thinned(time_s: Array, values: Array, points: int) -> tuple[Array, Array, float]:
-    """Means of both over at most ``points`` blocks, and -1.0 where a negative reading, that dies away, is turned."""
+    """Block means of time and values, at most ``points``, and the sign -1.0 where a negative reading was reversed."""
     width = -(-values.size // points)
     count = values.size // max(width, 1)
     if count == 0:
@@ -135,7 +135,7 @@ def _thinned(time_s: Array, values: Array, points: int) -> tuple[Array, Array, f
 
 
 def _first_at_its_level(reading: Array, low: float, standing: float, noise: float) -> int:
-    """Where a reading that ends at ``low`` has come to the highest level of its first tenth: a unit may be filled."""
+    """The index from which a reading that ends at ``low`` has reached its highest level: a unit may first be filled."""
     medians = np.median(np.lib.stride_tricks.sliding_window_view(reading[: max(reading.size // 10, 3)], 3), axis=1)
     top = int(np.argmax(medians))
     below = np.flatnonzero(reading[: top + 2] < medians[top] - max(standing * (medians[top] - low), noise))
@@ -143,7 +143,7 @@ def _first_at_its_level(reading: Array, low: float, standing: float, noise: floa
 
 
 def _falls(reading: Array, thresholds: Thresholds) -> bool:
-    """Whether it falls from a positive level, by more than its noise, and hardly ever rises."""
+    """Whether the reading falls from a positive level, by more than its noise, and hardly ever rises."""
     tenth = reading.size // 10
     first, last = reading[:tenth], reading[-tenth:]
     fall = float(np.median(first) - np.median(last))
@@ -163,7 +163,7 @@ def _falls(reading: Array, thresholds: Thresholds) -> bool:
 
 
 def _guess(t: Array, v: Array, high: float) -> float:
-    """Time constant of a straight line through the logarithm of the part above a fifth of ``high``, where it begins."""
+    """Time constant from a line through the logarithm of the first part, above a fifth of ``high``."""
     part = v > 0.2 * high
     part[:3] = True
     slope = float(np.polyfit(t[part], np.log(np.maximum(v[part], 1e-9 * high)), 1)[0])
@@ -172,13 +172,15 @@ def _guess(t: Array, v: Array, high: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Fitted:
+    """Parameters ``at`` the optimum, their standard deviations, and the sum of squares."""
+
     at: Array
     sd: Array
     square: float
 
 
 def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list[float]) -> _Fitted:
-    """Least squares; standard deviations allow for residuals that go on from sample to sample."""
+    """Least squares; the standard deviations allow for correlated residuals."""
     from scipy.optimize import least_squares
 
     begin = np.array(start, dtype=float)
@@ -194,22 +196,25 @@ def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list
     jac = np.asarray(found.jac, dtype=float)
     scale = np.linalg.norm(jac, axis=0)
     scale[scale == 0.0] = 1.0
-    # Of columns that are nearly alike the inverse of their products may have negative squares, its root has none.
+    # For nearly collinear columns the inverse of their products may have a negative diagonal; a pseudo-inverse of the
+    # columns has not.
     root = np.linalg.pinv(jac / scale)
     sd = np.linalg.norm(root, axis=1) / scale * np.sqrt(variance)
     return _Fitted(np.asarray(found.x, dtype=float), sd, square)
 
 
 def _exponential(at: Array, t: Array) -> Array:
+    """``at`` holds the initial value and the time constant."""
     return np.asarray(at[0] * np.exp(-t / max(at[1], 1e-9)))
 
 
 def _to_plateau(at: Array, t: Array) -> Array:
+    """An exponential towards the third value of ``at``."""
     return _exponential(at[:2], t) + float(at[2])
 
 
 def _of_order(at: Array, t: Array) -> Array:
-    """-v' = (v0/tau) (v/v0)^m from v0: v0 (1 + (m - 1) t/tau)^(-1/(m - 1)); ``at`` is v0, tau at the onset, m."""
+    """The solution of -v' = (v0/tau) (v/v0)^m: v0 (1 + (m - 1) t/tau)^(-1/(m - 1)); ``at`` holds v0, tau and m."""
     over = float(at[2]) - 1.0
     if abs(over) < 1e-6:
         return _exponential(at[:2], t)
@@ -218,6 +223,7 @@ def _of_order(at: Array, t: Array) -> Array:
 
 
 def _duration(time_s: float) -> str:
+    """A time in words, in s, min or h."""
     for limit_s, unit_s, name in ((600.0, 1.0, "s"), (7200.0, 60.0, "min")):
         if time_s < limit_s:
             return f"{time_s / unit_s:.3g} {name}"
@@ -225,6 +231,7 @@ def _duration(time_s: float) -> str:
 
 
 def _course_says(course: Course, order: float | None) -> str:
+    """The law of the decay in words."""
     if course == "undecided" or order is None:
         return "were it to fall to zero (too little is lost to say by which law)"
     if course == "exponential":

@@ -1,4 +1,4 @@
-"""What a protocol can tell, before anything is measured: which effects it shows, and which it tells apart."""
+"""What a protocol can show before anything is measured: which effects, and which of them it separates."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from smartshoe.models.effects import catalogue
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 
-USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # of full scale; of a log: where no unit states its own
+USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # noise, and rate of the log, where no unit states its own
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """What a protocol can tell.
+    """What a protocol can show.
 
-    ``least`` (n,): size from which on each of the effects ``names`` shows, rms share of full scale of all it does to
-    the reading, infinite where the baseline follows it whole. ``unlike`` (n, n): the share of an effect's evidence that
-    another one in its place cannot follow. ``evidence``: -2 log of an effect that leaves ``strength`` (rms share of
-    full scale) beyond what the baseline follows, for which `cannot_be_told` answers. ``limits``: what a diagnosis of
-    such recordings would say that they lack, whatever is in them. ``left_out``: the channels that further effects need,
-    by name: a design is of load and reading alone.
+    ``least`` (n,) is the size from which each of the effects ``names`` shows, rms as a share of full scale of all it
+    does to the reading; infinite where the baseline follows it completely. ``unlike`` (n, n) is the share of an
+    effect's evidence that another effect in its place cannot follow. ``evidence`` is -2 log of that for an effect of
+    size ``strength`` (rms share of full scale) beyond what the baseline follows, for which `cannot_be_told` answers.
+    ``limits`` are those that a diagnosis of such recordings would have in any case. ``left_out`` are the channels that
+    further effects need, by name, since a design has load and reading only.
     """
 
     names: tuple[str, ...]
@@ -49,9 +49,9 @@ class Design:
     left_out: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     def cannot_be_told(self, name: str) -> tuple[str, ...]:
-        """The effects that this protocol would not tell from ``name``, most alike first.
+        """The effects that this protocol would not separate from ``name``, most alike first.
 
-        By the odds that a diagnosis weighs laws with: another one lacks a share of an effect's evidence.
+        By the odds with which a diagnosis compares laws: another effect misses a share of the evidence.
         """
         k = self.names.index(name)
         alike = odds_of_law(self.unlike[k] * self.evidence, self.evidence, self.thresholds)
@@ -128,9 +128,9 @@ def design(
             raise UsageError(said)
     sessions, factors = sessions_on(unit, protocols, peak_n, 1.0 / sample_rate_hz, limits)
     columns = linearised(unit, sessions, limits)
-    # The mean of neighbours that thinning takes has less noise than a sample.
+    # Thinning averages neighbours, which reduces the noise.
     sd = 0.01 * noise_percent / math.sqrt(min(factors))
-    # Of one load cycle no cause is named, whatever its columns tell.
+    # With one load cycle no cause is named, whatever its columns show.
     lacking = [] if can_validate(sessions, limits) else [ONE_CYCLE]
     excitation = replace(excitation_of(sessions, limits), is_judged=True)
     lacking += excitation.limits()
@@ -142,7 +142,7 @@ def design(
 
 
 def too_short_of(protocol: Protocol, sample_rate_hz: float, thresholds: Thresholds | None = None) -> str | None:
-    """What is said of a protocol of which a log takes fewer samples than a diagnosis does with; None if it does not."""
+    """The sentence on a protocol whose log has fewer samples than a diagnosis needs; None if it has enough."""
     samples, least = math.ceil(protocol.duration_s * sample_rate_hz), (thresholds or Thresholds()).least_samples
     if samples >= least:
         return None
@@ -156,26 +156,26 @@ def too_short_of(protocol: Protocol, sample_rate_hz: float, thresholds: Threshol
 def _compared(
     columns: Linearised, sd: float, strength: float, limits: Thresholds, hidden: frozenset[str] = frozenset()
 ) -> Design:
-    """``hidden``: effects of which the columns show what no unit does as exactly, and that count as never seen."""
+    """The design from columns under noise ``sd``; ``hidden`` effects count as never shown (`Excitation.hides`)."""
     gram = columns.gram[1:, 1:] / sd**2
-    own = np.arange(columns.own)
-    left = gram - gram[:, own] @ np.linalg.pinv(gram[np.ix_(own, own)], rcond=1e-10, hermitian=True) @ gram[own]
+    own = np.arange(columns.baseline_count)
+    projected = gram - gram[:, own] @ np.linalg.pinv(gram[np.ix_(own, own)], rcond=1e-10, hermitian=True) @ gram[own]
     laws = [one for one in columns.candidates if not one.effect.is_flexible]
     names = tuple(dict.fromkeys(one.name for one in laws))
     count = sum(int(session.fitted.sum()) for session in columns.sessions)
-    shown = 2.0 * math.log(len(names) / limits.false_name)  # the prior odds against an effect
+    shown = 2.0 * math.log(len(names) / limits.false_name)  # prior odds against an effect, -2 log
     least, unlike = np.full(len(names), np.inf), np.ones((len(names), len(names)))
     firsts = np.array([one.columns[0] - 1 for one in laws])
-    powers = np.diag(left)[firsts]
+    powers = np.diag(projected)[firsts]
     seen = powers > 1e-9 * np.diag(gram)[firsts]
-    missed = np.array([_not_followed(left, rival, laws, powers) for rival in laws])
+    missed = np.array([_not_followed(projected, rival, laws, powers) for rival in laws])
     of = {name: np.array([one.name == name for one in laws]) for name in names}
     for i, name in enumerate(names):
         shapes = of[name] & seen
         if name in hidden or not shapes.any():
             unlike[i] = 0.0
             continue
-        # Of what the baseline does not follow it must also be material.
+        # Beyond what the baseline follows it must also be material.
         x = float(powers[shapes].max())
         least[i] = max(math.sqrt(shown / x), limits.material / (sd * math.sqrt(x / count)))
         for j, other in enumerate(names):
@@ -184,14 +184,15 @@ def _compared(
     return Design(names, least, unlike, strength, count * (strength / sd) ** 2, limits)
 
 
-def _not_followed(left: Array, rival: Candidate, targets: Sequence[Candidate], powers: Array) -> Array:
-    """(m,) the share of the square of each target's first column that a rival leaves, with a sign that physics allows.
+def _not_followed(projected: Array, rival: Candidate, targets: Sequence[Candidate], powers: Array) -> Array:
+    """(m,) share of the square of each target's first column that a rival leaves, with strengths of a physical sign.
 
-    Of several strengths a fit minds the bounds, and no sign is asked for here. ``powers`` (m,): the squares.
+    The sign is not asked of a rival with several strengths, since a fit keeps them within their bounds. ``powers`` (m,)
+    are the squares.
     """
     at, firsts = [column - 1 for column in rival.columns], [one.columns[0] - 1 for one in targets]
-    across = left[np.ix_(at, firsts)]
-    found = np.linalg.pinv(left[np.ix_(at, at)], rcond=1e-9, hermitian=True) @ across
+    across = projected[np.ix_(at, firsts)]
+    found = np.linalg.pinv(projected[np.ix_(at, at)], rcond=1e-9, hermitian=True) @ across
     shares = np.clip(1.0 - np.sum(found * across, axis=0) / np.maximum(powers, 1e-300), 0.0, 1.0)
     if len(at) == 1:
         shares[[not _may_follow(rival, one, found[:, k]) for k, one in enumerate(targets)]] = 1.0
@@ -199,6 +200,6 @@ def _not_followed(left: Array, rival: Candidate, targets: Sequence[Candidate], p
 
 
 def _may_follow(rival: Candidate, target: Candidate, strength: Array) -> bool:
-    """Whether physics allows a rival's ``strength`` (1,) beside a target's first of one, or both turned over."""
+    """Whether a rival's ``strength`` (1,) has a physical sign together with the target's first, or both reversed."""
     first = np.eye(1, len(target.columns))[0]
-    return any(target.has_sign_of(sign * first) and rival.has_sign_of(sign * strength) for sign in (1.0, -1.0))
+    return any(target.allows_sign_of(sign * first) and rival.allows_sign_of(sign * strength) for sign in (1.0, -1.0))

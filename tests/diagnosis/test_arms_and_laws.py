@@ -12,13 +12,13 @@ from told_evidence import STANDARD
 
 from smartshoe.diagnosis import _arms, _laws, _settling
 from smartshoe.diagnosis._arms import arms_of, effect_count
-from smartshoe.diagnosis._baseline import is_beyond_memory, is_stretched
+from smartshoe.diagnosis._baseline import has_arm_beyond_memory, has_extreme_arm
 from smartshoe.diagnosis._laws import (
+    _blocks_banned_for,
     _is_stretched,
-    _replaced_with,
-    _with_a_branch_each,
     _with_another_curve,
-    likelier,
+    _with_distinct_branches,
+    likelier_changes,
     with_laws,
 )
 from smartshoe.diagnosis._members import Alternative
@@ -37,7 +37,7 @@ NOTHING_FITTED = SimpleNamespace(sessions=())
      (-0.899, 49.9, False), (4.99, 0.0101, False)],
 )  # fmt: skip
 def test_an_arm_at_a_bound_is_stretched(share: float, rate: float, stretched: bool) -> None:
-    assert is_stretched(ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")) is stretched
+    assert has_extreme_arm(ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")) is stretched
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_an_arm_at_a_bound_is_stretched(share: float, rate: float, stretched: bo
 def test_an_arm_is_beyond_memory_where_it_relaxes_faster_or_slower_than_laws_remember(
     tau_s: float, beyond: bool
 ) -> None:
-    assert is_beyond_memory(replace(MODEL, relaxation_rate_per_s=1.0 / tau_s), STANDARD) is beyond
+    assert has_arm_beyond_memory(replace(MODEL, relaxation_rate_per_s=1.0 / tau_s), STANDARD) is beyond
 
 
 class _Fitted(SimpleNamespace):
@@ -66,7 +66,7 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
     half_way: dict[int, _Fitted] = {}
     gone_on: list[str] = []
     falls: dict[str, float] = {}
-    posterior = SimpleNamespace(posterior=lambda members: "ab"[members[0]], given="given")
+    posterior = SimpleNamespace(posterior=lambda members: "ab"[members[0]], linearisation="given")
 
     def fitted(likelihood: Any, given: Any, steps: int | None = None) -> Any:
         if steps is None:
@@ -81,14 +81,14 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
         half_way[id(found.model)] = found
         return found
 
-    monkeypatch.setattr(_arms, "searched", lambda start, sessions, thresholds: (posterior, "best"))
-    monkeypatch.setattr(_arms, "additions", lambda evidence, members, breadth: [0, 1])
+    monkeypatch.setattr(_arms, "linearised_search", lambda start, sessions, thresholds: (posterior, "best"))
+    monkeypatch.setattr(_arms, "best_additions", lambda evidence, members, breadth: [0, 1])
     monkeypatch.setattr(_arms, "with_members", lambda given, one, start, likelihood: (start, one))
     monkeypatch.setattr(_arms, "fit", fitted)
     monkeypatch.setattr(_arms, "state_at", lambda found, *given: found)
     state: Any = SimpleNamespace(
         fit=SimpleNamespace(model=replace(MODEL, relaxing_share=4.0, relaxation_rate_per_s=0.01)),
-        likelihood=lambda: None, thresholds=STANDARD, evidence=SimpleNamespace(odds=10.0), given=NOTHING_FITTED,
+        likelihood=lambda: None, thresholds=STANDARD, evidence=SimpleNamespace(odds=10.0), linearisation=NOTHING_FITTED,
     )  # fmt: skip
     # The fastest and the slowest of memories are no more such themselves: of a usual arm is that between.
     for there, fall, taken, going_on in (
@@ -124,8 +124,8 @@ def test_a_latency_is_the_best_that_is_not_there_yet_beside_a_usual_arm(monkeypa
         begun.append((one.name, bare.names, bare.relaxing_share, bare.relaxation_rate_per_s))
         return one.name
 
-    monkeypatch.setattr(_arms, "available", lambda sessions, thresholds: late)
-    monkeypatch.setattr(_arms, "begun_with", begin)
+    monkeypatch.setattr(_arms, "available_effects", lambda sessions, thresholds: late)
+    monkeypatch.setattr(_arms, "start_with", begin)
     monkeypatch.setattr(_arms, "fit", lambda likelihood, name: SimpleNamespace(model=name, cost=-len(name)))
     likelihood = SimpleNamespace(sessions=())
     stretched = ExtendedModel(1.0, 5.0, 50.0, 800.0, 140.0, "mbar").with_part("delay")
@@ -133,7 +133,7 @@ def test_a_latency_is_the_best_that_is_not_there_yet_beside_a_usual_arm(monkeypa
         fit=SimpleNamespace(model=stretched), likelihood=lambda: likelihood, thresholds=STANDARD
     )
     expected = [name for name in latencies if name != "delay"]
-    assert _arms.late_beside_usual_arm(state).model == max(expected, key=len)  # type: ignore[comparison-overlap]
+    assert _arms.latency_with_usual_arm(state).model == max(expected, key=len)  # type: ignore[comparison-overlap]
     assert begun == [(name, ("delay",), 0.08, 0.22) for name in expected]
 
 
@@ -143,10 +143,10 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
     starts: list[Any] = []
     leaks: list[float] = []
 
-    def searched(start: ExtendedModel, sessions: Any, thresholds: Any) -> Any:
+    def linearised_search(start: ExtendedModel, sessions: Any, thresholds: Any) -> Any:
         starts.append((start.names, start.relaxing_share, start.relaxation_rate_per_s))
         leaks.extend(float(part.values[0]) for part in start.parts)
-        return SimpleNamespace(given="given"), "best"
+        return SimpleNamespace(linearisation="given"), "best"
 
     costs = {1.0 / 0.3: 50.0, 1.0 / 3.0: 45.0, 1.0 / 30.0: 100.0, 0.2: 40.0}
 
@@ -156,16 +156,16 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
         ended = ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")
         return SimpleNamespace(model=ended, cost=costs[rate], steps=steps, likelihood=likelihood)
 
-    monkeypatch.setattr(_arms, "searched", searched)
+    monkeypatch.setattr(_arms, "linearised_search", linearised_search)
     monkeypatch.setattr(_arms, "with_members", lambda given, best, start, likelihood: start)
     monkeypatch.setattr(_arms, "fit", fitted)
     monkeypatch.setattr(_arms, "state_at", lambda found, *given: found)
     for odds, rate in ((10.0, 1.0 / 3.0), (1.0, 0.2)):
         state: Any = SimpleNamespace(
             fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD,
-            evidence=SimpleNamespace(odds=odds), given=NOTHING_FITTED,
+            evidence=SimpleNamespace(odds=odds), linearisation=NOTHING_FITTED,
         )  # fmt: skip
-        found: Any = _arms.with_an_arm_that_creeps(state)
+        found: Any = _arms.with_creeping_arm(state)
         assert (found.model.relaxation_rate_per_s, found.steps) == (rate, 25)  # the best go on to their end
     memories = [((), 0.08, 1.0 / tau_s) for tau_s in STANDARD.memory_s]
     arms = [*memories, ((), pytest.approx(0.2), pytest.approx(0.2))]
@@ -225,15 +225,15 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
     curve = next(one for family in blocks().values() for one in family if one.is_memoryless)
     other = next(one for family in blocks().values() for one in family if not one.is_memoryless)
     curves = {one.name for family in blocks().values() for one in family if one.is_memoryless}
-    assert set(_replaced_with(curve)) == curves
-    assert _replaced_with(other) == (other.name,)
+    assert set(_blocks_banned_for(curve)) == curves
+    assert _blocks_banned_for(other) == (other.name,)
     chosen = tuple(SimpleNamespace(effect=one, name=one.name) for one in (curve, effect("dead_band"), other))
     about: Any = SimpleNamespace(model=MODEL.with_part(curve).with_part(other))
     state: Any = SimpleNamespace(chosen=chosen, fit=about, thresholds=STANDARD, banned=("z",), likelihood=lambda: None)
     lawful: Any = SimpleNamespace(model=MODEL)
     asked: list[Any] = []
     bound = STANDARD.departure**2
-    for missed, banned in ((0.999 * bound, _replaced_with(curve)), (bound, ())):
+    for missed, banned in ((0.999 * bound, _blocks_banned_for(curve)), (bound, ())):
         asked.clear()
 
         def law_of(block: Any, one: Any, at: Any, plain: Any, likelihood: Any, missed: float = missed) -> Any:
@@ -260,16 +260,17 @@ def _weighed(
     name: str,
     *laws: tuple[str, float],
     nothing: float = 50.0,
-    departed: float = 0.5,
+    departure_sds: float = 0.5,
     size: float = 0.01,
-    is_ended: bool = False,
+    is_at_end_of_kind: bool = False,
 ) -> Any:
     fits: dict[str, Any] = {law: SimpleNamespace(model=f"{law} for {name}") for law, _ in laws}
     made = tuple(Alternative(law, margin, fits[law]) for law, margin in laws)
     others = [Alternative(other, 1.0, shape={"at": 3.0}) for other in ("delay", "near", "dead_band", "gas_heat")]
     return SimpleNamespace(
-        name=name, fall=100.0, departed=departed, laws=made, alternatives=(Alternative(None, nothing), *others),
-        without=SimpleNamespace(model=f"without {name}"), size=size, is_ended=is_ended,
+        name=name, fall=100.0, departure_sds=departure_sds, laws=made,
+        alternatives=(Alternative(None, nothing), *others),
+        without=SimpleNamespace(model=f"without {name}"), size=size, is_at_end_of_kind=is_at_end_of_kind,
         effect=SimpleNamespace(why_unnamed="", is_memoryless=False),
     )  # fmt: skip
 
@@ -279,7 +280,7 @@ def test_a_unit_has_one_curve_of_each_branch() -> None:
     candidates: Any = [SimpleNamespace(name=name, branch=branch) for name, branch in branches.items()]
     sets = [("wall_hardening", "saturation", "zero_offset"), ("wall_hardening", "contact_area"), ("contact_area",)]
     fits: Any = [SimpleNamespace(model=SimpleNamespace(names=names)) for names in sets]
-    assert [one.model.names for one in _with_a_branch_each(fits, candidates)] == [sets[0], sets[2]]
+    assert [one.model.names for one in _with_distinct_branches(fits, candidates)] == [sets[0], sets[2]]
 
 
 @pytest.mark.parametrize(
@@ -303,7 +304,7 @@ def test_a_curve_of_another_branch_is_tried_beside_a_law_and_beside_the_nearest_
     there = effect(curve) if curve in catalogue() else next(b for b in blocks()["static_curve"] if b.name == curve)
     given: Any = SimpleNamespace(candidates=[Candidate(there, {}, (1,)), Candidate(stop, {"level": 0.9}, (2, 3))])
     about: Any = SimpleNamespace(
-        given=given, thresholds=STANDARD, extensions=lambda members: [(5.0, 1, np.array([0.1, 0.1]))]
+        linearisation=given, thresholds=STANDARD, extensions=lambda members: [(5.0, 1, np.array([0.1, 0.1]))]
     )
 
     def fitted(is_of: str, *names: str, cost: float = 5000.0) -> Any:
@@ -339,7 +340,7 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
         else:
             assert beside == (None if name == "found" else "given found")
             asked.append(name)
-        return SimpleNamespace(given=f"given {name}"), SimpleNamespace(score=scores.get(name, 100.0))
+        return SimpleNamespace(linearisation=f"given {name}"), SimpleNamespace(score=scores.get(name, 100.0))
 
     def with_law(law: Any, model: Any, likelihood: Any, shapes: Any) -> Any:
         assert shapes == ({"at": 3.0},)
@@ -349,13 +350,13 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     monkeypatch.setattr(_laws, "fit_with", with_law)
     found: Any = SimpleNamespace(model=SimpleNamespace(names=("delay", "leak")), likelihood=None)
     laws = [SimpleNamespace(name=name, effect=law) for name, law in catalogue().items()]
-    evidence: Any = SimpleNamespace(thresholds=STANDARD, odds=10.0, given=SimpleNamespace(candidates=laws))
+    evidence: Any = SimpleNamespace(thresholds=STANDARD, odds=10.0, linearisation=SimpleNamespace(candidates=laws))
 
     def told(*members: Any) -> list[str]:
         asked.clear()
         anew.clear()
-        states = [*likelier(found, evidence, members)]
-        assert {state.given for state in states} <= {f"given {name}" for name in anew}
+        states = [*likelier_changes(found, evidence, members)]
+        assert {state.linearisation for state in states} <= {f"given {name}" for name in anew}
         return [state.fit.model for state in states]  # type: ignore[misc]
 
     assert told() == told(_weighed("leak")) == []
@@ -377,11 +378,18 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     # One whose equation is far from what it follows, or which lies where its kind ends, may be of another kind where it
     # is large: the nearest effect that is neither there nor tried.
     other = "dead_band without leak"
-    for departed, is_ended, size, is_tried in (
+    for departure_sds, is_at_end_of_kind, size, is_tried in (
         (1.0, False, 0.01, False), (1.01, False, STANDARD.tolerable, False), (1.01, False, 0.01, True),
         (0.0, True, STANDARD.tolerable, False), (0.0, True, 0.01, True),
     ):  # fmt: skip
-        assert told(_weighed("leak", ("near", 99.0), departed=departed, size=size, is_ended=is_ended)) == []
+        assert (
+            told(
+                _weighed(
+                    "leak", ("near", 99.0), departure_sds=departure_sds, size=size, is_at_end_of_kind=is_at_end_of_kind
+                )
+            )
+            == []
+        )
         assert (asked == ["found", other]) is is_tried
     # Or where that is likelier in its place, as what was taken out beside it may be.
     rival = _weighed("leak", ("near", 99.0), size=0.01)
@@ -391,7 +399,7 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
         assert told(rival) == []
         assert (asked == ["found", other]) is is_tried
     scores |= {other: 70.0, "near for lag": 60.0}
-    more = _weighed("leak", ("near", 99.0), departed=2.0), _weighed("lag", ("near", 1.0))
+    more = _weighed("leak", ("near", 99.0), departure_sds=2.0), _weighed("lag", ("near", 1.0))
     assert told(*members, *more) == ["near for lag", other, "without lag"]
 
 

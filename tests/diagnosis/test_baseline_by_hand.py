@@ -19,7 +19,7 @@ from smartshoe.diagnosis._baseline import (
     USUAL,
     _wall_ratio,
     baseline_of,
-    is_turned_over,
+    has_negative_gain,
     with_usual_arm,
 )
 from smartshoe.diagnosis._likelihood import within_bounds
@@ -102,8 +102,8 @@ def test_a_unit_that_is_slower_than_its_load_is_not_turned_over() -> None:
         scale = full_scale([one], usable, STANDARD)
         assert scale.reading * sign < 0.0  # what goes together at once tells the other sign
         sessions = prepare([one], usable, None, scale, [1], STANDARD)
-        assert is_turned_over(sessions, STANDARD)
-        assert not is_turned_over([replace(one, reading=-one.reading) for one in sessions], STANDARD)
+        assert has_negative_gain(sessions, STANDARD)
+        assert not has_negative_gain([replace(one, reading=-one.reading) for one in sessions], STANDARD)
         assert prepared([one], 1, examine([one], STANDARD), STANDARD).scale.reading * sign > 0.0
 
 
@@ -112,11 +112,11 @@ def test_a_sign_that_tells_little_stays_as_it_is() -> None:
     for sign, is_turned in ((1.0, False), (-1.0, True)):
         for one in sessions:
             one.reading = sign * one.conditions.load
-        assert is_turned_over(sessions, STANDARD) is is_turned
+        assert has_negative_gain(sessions, STANDARD) is is_turned
     rng = np.random.default_rng(1)
     for one in sessions:
         one.reading = rng.standard_normal(one.reading.size) - 0.1 * one.conditions.load
-    assert not is_turned_over(sessions, STANDARD)
+    assert not has_negative_gain(sessions, STANDARD)
 
 
 def test_a_reading_that_falls_under_load_has_a_plain_baseline() -> None:

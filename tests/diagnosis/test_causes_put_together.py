@@ -41,7 +41,7 @@ def test_names_know_whether_loads_go_with_the_clock_and_zeros_change(parts: Any)
         parts.given.excitation.goes_with_the_clock = there
         parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if there else ()
         run_diagnosis(parts)
-        assert parts.seen["names_of"][1] == {"is_clocked": there, "is_unsteady": there, "alone": None}
+        assert parts.seen["names_of"][1] == {"is_clocked": there, "is_unsteady": there, "best_single": None}
 
 
 def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:
@@ -106,7 +106,7 @@ def test_of_what_is_no_unit_or_one_cycle_no_zero_is_told(parts: Any) -> None:
     parts.given.is_no_unit = True
     told = run_diagnosis(parts)
     assert (told.causes, told.verdict) == ((), "unexplained")
-    assert parts.seen["inferred"][0][4] is False
+    assert parts.seen["infer_with_gas_check"][0][4] is False
     parts.seen.clear()
     parts.given.is_no_unit, parts.found.can_validate = False, False
     assert run_diagnosis(parts).causes == ()
@@ -134,7 +134,7 @@ def test_what_is_material_at_the_least_is_a_zero(parts: Any) -> None:
 
 
 def test_what_effects_undo_is_offered_no_name(parts: Any) -> None:
-    parts.found.undone = ("dead_band",)
+    parts.found.cancelling_names = ("dead_band",)
     run_diagnosis(parts)
     assert [one.name for one in parts.seen["names_of"][0][0]] == ["second_relaxation", "second_relaxation"]
 
@@ -149,9 +149,12 @@ def test_what_does_most_by_itself_is_named_though_others_undo_it(parts: Any, mon
 
     monkeypatch.setattr(_withheld, "names_of", names_of)
     parts.names = [name_of("linear_leak")]
-    parts.found.undone, parts.found.alone = ("second_relaxation", "dead_band"), effect("power_law_creep")
+    parts.found.cancelling_names, parts.found.best_single = (
+        ("second_relaxation", "dead_band"),
+        effect("power_law_creep"),
+    )
     told = run_diagnosis(parts)
     assert [one.name for one in told.causes] == ["linear_leak"]
     (first, _), (second, how) = asked
     assert (first, second) == ([], ["second_relaxation", "second_relaxation"])  # of the kind of what does most alone
-    assert (how["is_unsteady"], how["alone"]) == (True, parts.found.alone)
+    assert (how["is_unsteady"], how["best_single"]) == (True, parts.found.best_single)

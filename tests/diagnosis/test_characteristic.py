@@ -132,11 +132,14 @@ def test_how_much_the_curve_and_the_branches_explain() -> None:
         assert one is not None
         return one
 
-    line, rubbed = found(TRIANGLE), found(10.0 * _rising())
+    line, lasting_memory = found(TRIANGLE), found(10.0 * _rising())
     assert line.by_curve == pytest.approx(1.0, abs=0.01)
-    assert (rubbed.by_curve, rubbed.by_branch) == (pytest.approx(0.0, abs=0.02), pytest.approx(1.0, abs=0.02))
-    assert rubbed.ups == pytest.approx(np.full(rubbed.place.size, 10.0))
-    assert rubbed.mean == pytest.approx(np.zeros(rubbed.place.size))
+    assert (lasting_memory.by_curve, lasting_memory.by_branch) == (
+        pytest.approx(0.0, abs=0.02),
+        pytest.approx(1.0, abs=0.02),
+    )
+    assert lasting_memory.ups == pytest.approx(np.full(lasting_memory.place.size, 10.0))
+    assert lasting_memory.mean == pytest.approx(np.zeros(lasting_memory.place.size))
     noise = 20.0 * np.random.default_rng(3).standard_normal(TIME_S.size)
     power = float(np.var(TRIANGLE))
     assert found(TRIANGLE + noise).by_curve == pytest.approx(power / (power + 400.0), abs=0.03)

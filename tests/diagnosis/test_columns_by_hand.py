@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from told_columns import MODEL, STANDARD, STEP_S, past_columns, session_under, sessions_under, some_load
 from told_evidence import WAVE, session_of
 
-from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
     _factors,
-    available,
+    available_effects,
     departures,
     directions,
     lagged,
@@ -55,11 +55,11 @@ def test_strengths_begin_from_their_nulls_within_their_bounds() -> None:
 def test_a_strength_has_the_sign_that_its_bounds_allow() -> None:
     up, down, either = _candidate((0.0, 0.0, 5.0)), _candidate((0.0, -5.0, 0.0)), _candidate((0.0, -5.0, 5.0))
     for one, told in ((up, (True, True, False)), (down, (False, True, True)), (either, (True, True, True))):
-        assert tuple(one.has_sign_of(np.array([by])) for by in (1.0, 0.0, -1.0)) == told
+        assert tuple(one.allows_sign_of(np.array([by])) for by in (1.0, 0.0, -1.0)) == told
     both = _candidate((0.0, 0.0, 5.0), (0.0, -5.0, 0.0))
-    assert both.has_sign_of(np.array([1.0, -1.0]))
-    assert not both.has_sign_of(np.array([1.0, 1.0]))
-    assert not both.has_sign_of(np.array([-1.0, -1.0]))
+    assert both.allows_sign_of(np.array([1.0, -1.0]))
+    assert not both.allows_sign_of(np.array([1.0, 1.0]))
+    assert not both.allows_sign_of(np.array([-1.0, -1.0]))
 
 
 def test_of_a_family_or_the_one_that_is_imitated_there_is_one_but_for_branches_that_the_data_tells() -> None:
@@ -96,12 +96,12 @@ def test_an_effect_needs_its_channel_in_every_session() -> None:
     bare, beside, warm = session(), session(neighbour=WAVE), session(temperature_k=WAVE)
 
     def told(*sessions: Any) -> set[str]:
-        return {one.name for one in available(sessions, STANDARD)}
+        return {one.name for one in available_effects(sessions, STANDARD)}
 
     assert told(beside) - told(bare) == {"cross_talk"}
     assert told(beside, bare) == told(bare)
     assert told(warm) >= told(bare)
-    for one in available([bare], STANDARD):
+    for one in available_effects([bare], STANDARD):
         assert one.is_physical
         assert one.shifts is None
         assert not one.is_refinement
@@ -114,7 +114,7 @@ def test_what_only_later_load_cycles_show_is_not_looked_for_where_no_recording_h
     twice = session_of(np.interp(np.arange(200), [0, 50, 100, 150, 199], [0.0, 1.0, 0.1, 0.6, 0.0]))
 
     def told(*sessions: Any) -> set[str]:
-        return {one.name for one in available(sessions, STANDARD)}
+        return {one.name for one in available_effects(sessions, STANDARD)}
 
     memories = {
         "mullins_softening", "cycle_conditioning", "gain_drift", "flexible_softening", "flexible_gain_drift",
@@ -205,7 +205,7 @@ def test_what_no_column_reaches_is_the_noise() -> None:
         left.append(
             row[:, 0] - row[:, 1:] @ found[:2] - past_columns(one, MODEL.pole_per_s) @ found[2 + 2 * k : 4 + 2 * k]
         )
-    expected = correlated_sd(left, [one.fitted for one in sessions])
+    expected = effective_noise_sd(left, [one.fitted for one in sessions])
     assert given.noise_sd() == pytest.approx(expected, rel=1e-6)
     parts = [marginal(r, one, MODEL.pole_per_s) for r, one in zip(rows, sessions, strict=True)]
     assert given.gram[0, 0] == pytest.approx(sum(part[0, 0] for part in parts))
@@ -259,7 +259,7 @@ def test_columns_of_a_model_nearby_serve_for_what_is_in_neither() -> None:
     by, anew = linearised(other, sessions, STANDARD), linearised(model, sessions, STANDARD)
     found = linearised(model, sessions, STANDARD, by)
     told, expected = ([(one.name, one.shape, one.columns) for one in each.candidates] for each in (found, anew))
-    assert (told, found.own, found.model) == (expected, anew.own, model)
+    assert (told, found.baseline_count, found.model) == (expected, anew.baseline_count, model)
     assert "saturation" in {one.name for one in found.candidates}  # it is in one of them
     for rows, whole, known in zip(found.rows, anew.rows, by.rows, strict=True):
         assert rows[:, :6] * found.scales[:6] == pytest.approx(whole[:, :6] * anew.scales[:6], abs=1e-12)
@@ -278,7 +278,7 @@ def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     nothing = session_under(some_load(50, 5), np.zeros(50), lost=1.1)
     found = linearised(model, [sessions[0], nothing, sessions[1]], STANDARD)
     assert found.sessions == tuple(sessions)
-    assert (found.own, found.scales[0]) == (3, 1.0)
+    assert (found.baseline_count, found.scales[0]) == (3, 1.0)
     assert [one.columns for one in found.candidates[:2]] == [(4,), (5,)]
     assert [one.name for one in found.candidates[:2]] == ["dead_band", "delay"]
     assert (dict(found.candidates[0].shape), dict(found.candidates[1].shape)) == ({"softness": 0.3, "onset": 0.1}, {})

@@ -19,7 +19,7 @@ from smartshoe.diagnosis._characteristic import (
     characteristic_of,
     friction_of,
 )
-from smartshoe.diagnosis._ranges import Ranges, _between, _gain, ranges_of
+from smartshoe.diagnosis._ranges import Ranges, _gain, _gain_between_files, ranges_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
@@ -201,7 +201,7 @@ def test_what_follows_neither_load_nor_direction_has_no_course(monkeypatch: pyte
         return _said(monkeypatch, found), friction_of(run, STANDARD)
 
     assert told(0.29, 0.29) == (None, None)
-    monkeypatch.setattr(_characteristic, "_comes_back", lambda recording, thresholds: True)
+    monkeypatch.setattr(_characteristic, "_is_reproducible", lambda recording, thresholds: True)
     for by_branch in (FOLLOWS, 0.9):
         curve, friction = told(0.29, by_branch)
         assert curve == friction
@@ -333,9 +333,9 @@ def test_between_files_the_gain_is_of_their_means() -> None:
     kept = [(np.array([0.0, 0.2]), np.array([1.0, 3.0])), (np.array([0.4, 0.6]), np.array([4.0, 4.0])),
             (np.array([0.9, 0.9]), np.array([0.0, 1.0]))]  # fmt: skip
     loads, readings = [0.1, 0.5, 0.9], [2.0, 4.0, 0.5]
-    assert _between(kept, 0.25) == pytest.approx(np.polyfit(loads, readings, 1)[0])
-    assert _between(kept[:1], 0.25) is None
-    assert _between(kept[:2], 0.41) is None
-    assert _between(kept[:2], 0.39) == pytest.approx(5.0)
+    assert _gain_between_files(kept, 0.25) == pytest.approx(np.polyfit(loads, readings, 1)[0])
+    assert _gain_between_files(kept[:1], 0.25) is None
+    assert _gain_between_files(kept[:2], 0.41) is None
+    assert _gain_between_files(kept[:2], 0.39) == pytest.approx(5.0)
     level = [(load, np.ones(2)) for load, _ in kept]
-    assert _between(level, 0.25) is None
+    assert _gain_between_files(level, 0.25) is None

@@ -21,7 +21,7 @@ from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
-from smartshoe.diagnosis._next_experiment import _contest, _fastest_n_per_s, _in_place_of, _is_of, next_experiment
+from smartshoe.diagnosis._next_experiment import _contest, _fastest_n_per_s, _in_place_of, _is_run_of, next_experiment
 from smartshoe.diagnosis._result import NextExperiment
 from smartshoe.diagnosis.design import Design, _compared, _not_followed, design
 from smartshoe.models.effects import Conditions, effect
@@ -48,12 +48,12 @@ def _columns(matrix: Array, candidates: list[tuple[str, tuple[int, ...], bool]],
             name=name,
             columns=columns,
             effect=SimpleNamespace(is_flexible=flexible),
-            has_sign_of=lambda strengths, name=name: name not in SIGNED or strengths[0] >= 0.0,
+            allows_sign_of=lambda strengths, name=name: name not in SIGNED or strengths[0] >= 0.0,
         )
         for name, columns, flexible in candidates
     ]
     session = SimpleNamespace(fitted=np.ones(matrix.shape[0], dtype=bool))
-    return SimpleNamespace(gram=wide.T @ wide, own=own, candidates=made, sessions=[session])
+    return SimpleNamespace(gram=wide.T @ wide, baseline_count=own, candidates=made, sessions=[session])
 
 
 def _left(target: Array, beside: Array) -> Array:
@@ -102,8 +102,8 @@ def test_what_columns_leave_of_a_square_is_a_share() -> None:
     left = np.array([[4.0, 2.0, 0.0], [2.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
 
     def missed(*columns: int, power: float = 4.0) -> float:
-        rival: Any = SimpleNamespace(columns=columns, has_sign_of=lambda strengths: True)
-        target: Any = SimpleNamespace(columns=(1,), has_sign_of=lambda strengths: True)
+        rival: Any = SimpleNamespace(columns=columns, allows_sign_of=lambda strengths: True)
+        target: Any = SimpleNamespace(columns=(1,), allows_sign_of=lambda strengths: True)
         return float(_not_followed(left, rival, [target], np.array([power]))[0])
 
     assert missed(2) == pytest.approx(0.5)
@@ -248,9 +248,11 @@ class _Foretold:
         self.cause = SimpleNamespace(likelihood=SimpleNamespace(sessions=()))
         self.asked: list[str] = []
 
-    def after(self, protocol: Any, sample_time_s: float, least: float, of_use: float) -> _Foretold | None:
+    def after_experiment(
+        self, protocol: Any, sample_time_s: float, least: float, min_log_odds: float
+    ) -> _Foretold | None:
         assert sample_time_s == pytest.approx(0.005)  # of the recording that was logged most quickly
-        assert of_use == min(2.0 * self.log_odds, ENDS)  # what comes to no more is never proposed
+        assert min_log_odds == min(2.0 * self.log_odds, ENDS)  # what comes to no more is never proposed
         self.asked.append(protocol.name)
         then = _Foretold(*self._then.get(protocol.name, (self.log_odds, self.margin)))
         return then if then.margin - self.margin > least else None
@@ -283,7 +285,7 @@ def _next(
     made = {name: (lambda peak_n, name=name: _pressing(name, lasting[name], rate_n_per_s)) for name in lasting}
     monkeypatch.setattr(_next_experiment, "EXPERIMENTS", made)
     unseen = NextExperiment((), "unseen", None, "unseen", None, _pressing("unseen", 50.0, rate_n_per_s))
-    monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: unseen)
+    monkeypatch.setattr(_next_experiment, "_protocol_for_missing_excitation", lambda *given: unseen)
     found: Any = SimpleNamespace(
         fit=SimpleNamespace(model=MODEL), can_validate=can_validate, own_gains=own_gains, zero_changes=zero_changes
     )
@@ -395,7 +397,7 @@ def test_a_protocol_that_the_data_holds_is_of_one_shape_and_length() -> None:
     def held(load: Array, upto_s: float = 24.0) -> bool:
         kept = time_s < upto_s
         session: Any = SimpleNamespace(conditions=SimpleNamespace(time_s=time_s[kept], load=load[kept]))
-        return _is_of(protocol, session, 400.0, STANDARD.same)
+        return _is_run_of(protocol, session, 400.0, STANDARD.same)
 
     asked = protocol.load_at(time_s) / 400.0
     assert held(asked)
@@ -465,11 +467,11 @@ def test_a_contest_is_of_what_was_fitted_and_of_what_is_fitted_in_a_blocks_place
         return Fit(SimpleNamespace(held_as=lambda whole: f"{what}, held as {whole}"), 0.0, None)  # type: ignore[arg-type]
 
     monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, part, law: fitted(f"{law} for {part}"))
-    monkeypatch.setattr(Contest, "settled", lambda self: self)
+    monkeypatch.setattr(Contest, "refitted", lambda self: self)
     laws = (Alternative("contact_area", 3.0, fitted("contact")), Alternative("dead_band", 4.0, fitted("band")))
-    untold = (Alternative("zero_drift", 5.0, fitted("drift")),)
+    confounded = (Alternative("zero_drift", 5.0, fitted("drift")),)
     members = [
-        SimpleNamespace(name=name, laws=laws, untold=untold, without=f"without {name}")
+        SimpleNamespace(name=name, laws=laws, confounded=confounded, without=f"without {name}")
         for name in ("other", "flexible_curve", "gas_compression")
     ]
     found: Any = SimpleNamespace(fit=SimpleNamespace(model="whole"), members=members)
@@ -486,7 +488,7 @@ def test_a_contest_is_of_what_was_fitted_and_of_what_is_fitted_in_a_blocks_place
 # -- names ------------------------------------------------------------------------------------------------------------
 def _member(
     size: float = 0.01,
-    departed: float = 0.5,
+    departure_sds: float = 0.5,
     margin: float | None = 40.0,
     fall: float = 100.0,
     laws: tuple[tuple[str | None, float], ...] = (),
@@ -495,21 +497,21 @@ def _member(
 ) -> Any:
     near = () if margin is None else (SimpleNamespace(effect="delay", margin=1.0), Alternative(None, margin))
     return SimpleNamespace(
-        effect=effect("linear_leak"), size=size, departed=departed, alternatives=near, fall=fall,
-        laws=tuple(Alternative(name, by) for name, by in laws), others_depart=others, likeness=likeness,
-        is_any_curve=False, untold=(), bends_too_little=False,
+        effect=effect("linear_leak"), size=size, departure_sds=departure_sds, alternatives=near, fall=fall,
+        laws=tuple(Alternative(name, by) for name, by in laws), others_departure_rms=others, likeness=likeness,
+        is_any_curve=False, confounded=(), bends_too_little=False,
     )  # fmt: skip
 
 
 def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
     """2.77; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -2.22 a likeness."""
-    for size, departed, left, margin, others, likeness in (
+    for size, departure_sds, left, margin, others, likeness in (
         (0.01, 0.5, 0.002, 40.0, 0.003, 0.4), (0.001, 2.0, 0.01, 3.0, 0.0, 0.0), (0.05, 0.0, 0.0, 0.5, 0.01, 0.9),
     ):  # fmt: skip
         ratio = (math.hypot(left, others) + 2e-4) / (size + 2e-4)
-        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departed - 2.22 * likeness
+        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departure_sds - 2.22 * likeness
         expected = 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-margin / 2.0))
-        one = _member(size, departed, margin, others=others, likeness=likeness)
+        one = _member(size, departure_sds, margin, others=others, likeness=likeness)
         assert probability_of_kind(one, left, STANDARD) == pytest.approx(expected)
     worse = probability_of_kind(_member(margin=-5.0), 0.002, STANDARD)
     assert worse == pytest.approx(0.5 * probability_of_kind(_member(margin=None), 0.002, STANDARD))
@@ -533,8 +535,8 @@ def test_a_law_is_as_sure_as_its_nearest_rivals_odds_say() -> None:
 
 
 def test_a_member_is_named_from_what_is_material_and_sure_on() -> None:
-    assert names_of([_member(size=STANDARD.material, departed=0.0)], 0.0, STANDARD) != ()
-    assert names_of([_member(size=0.999 * STANDARD.material, departed=0.0)], 0.0, STANDARD) == ()
+    assert names_of([_member(size=STANDARD.material, departure_sds=0.0)], 0.0, STANDARD) != ()
+    assert names_of([_member(size=0.999 * STANDARD.material, departure_sds=0.0)], 0.0, STANDARD) == ()
     sure = probability_of_kind(_member(), 0.002, STANDARD)
     for least, is_sure in ((sure, True), (sure + 1e-9, False)):
         (name,) = names_of([_member()], 0.002, replace(STANDARD, least_confidence=least))

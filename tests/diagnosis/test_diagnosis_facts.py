@@ -18,8 +18,8 @@ from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gauss_markov import gauss_markov_of
-from smartshoe.diagnosis._inference import independent
-from smartshoe.diagnosis._lack_of_fit import slow
+from smartshoe.diagnosis._inference import independent_count
+from smartshoe.diagnosis._lack_of_fit import slow_structure
 from smartshoe.diagnosis._residual_structure import worst_place
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import offsets
@@ -52,14 +52,14 @@ def test_a_zero_that_is_moved_is_the_recordings_own_offset() -> None:
 
 def test_of_a_single_recording_each_load_cycle_can_be_left_out() -> None:
     """And of several each recording."""
-    assert independent(sessions_of(recording(rates=(200, 800)))[0], Thresholds()) == 6
-    assert independent(sessions_of(recording(seed=1), recording(seed=2))[0], Thresholds()) == 2
+    assert independent_count(sessions_of(recording(rates=(200, 800)))[0], Thresholds()) == 6
+    assert independent_count(sessions_of(recording(seed=1), recording(seed=2))[0], Thresholds()) == 2
 
 
 def test_cycles_are_counted_of_a_load_that_moves_by_a_part_of_the_largest() -> None:
     (session,), _ = sessions_of(recording(rates=(200, 800)))
     shallow = replace(session.conditions, load=0.7 + 0.05 * session.conditions.load)
-    assert independent([replace(session, conditions=shallow)], Thresholds()) == 6
+    assert independent_count([replace(session, conditions=shallow)], Thresholds()) == 6
 
 
 @given(st.integers(0, 999), st.integers(1, 5))
@@ -71,7 +71,7 @@ def test_evidence_is_that_of_gaussian_data(seed: int, members: int) -> None:
     index = rng.permutation(6)[:members]
     together = np.column_stack([y, columns])
     known = SimpleNamespace(_reduced=together.T @ together)
-    _, _, fall = Evidence._moved(known, index + 1, sds)  # type: ignore[arg-type]
+    _, _, fall = Evidence._solve(known, index + 1, sds)  # type: ignore[arg-type]
     own = columns[:, index] * sds
     covariance = np.eye(30) + own @ own.T
     assert y @ y - fall == pytest.approx(
@@ -102,10 +102,10 @@ def test_noise_that_is_louder_in_parts_is_no_structure(sessions: list[Session]) 
     for session in sessions:
         loud = np.where(np.arange(session.reading.size) // 200 % 2 == 0, 1.0, 4.0)
         found.append(0.001 * loud * rng.standard_normal(loud.size))
-    assert abs(slow(sessions, found, Thresholds(hold_s=1.0)).z) < 4.0
+    assert abs(slow_structure(sessions, found, Thresholds(hold_s=1.0)).z) < 4.0
     sines = [0.002 * np.sin(2 * np.pi * session.conditions.time_s / 20.0) for session in sessions]
     both = [noise + sine for noise, sine in zip(found, sines, strict=True)]
-    assert slow(sessions, both, Thresholds(hold_s=1.0)).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
+    assert slow_structure(sessions, both, Thresholds(hold_s=1.0)).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
 
 
 def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list[Session]) -> None:
@@ -120,8 +120,8 @@ def test_branches_of_fast_strokes_are_told_by_a_short_echo() -> None:
     """Friction, at strokes of 0.6 s: the load's direction is looked at over half of the echo."""
     time_s = np.arange(0.0, 60.0, 0.01)
     load = 100.0 * (2.0 * np.abs(2.0 * (time_s / 0.6 % 1.0) - 1.0) - 1.0)
-    rubbed = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=5.0 * np.sign(np.gradient(load)))
-    said = characteristic_of(rubbed, Thresholds(echo_s=1 / 12))
+    lasting_memory = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=5.0 * np.sign(np.gradient(load)))
+    said = characteristic_of(lasting_memory, Thresholds(echo_s=1 / 12))
     assert said is not None
     assert float(re.findall(r"lies ([\d.]+) mbar above", said)[0]) == pytest.approx(5.0, rel=0.02)
 

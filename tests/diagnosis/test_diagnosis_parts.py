@@ -17,9 +17,9 @@ from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._held_out import errors, gain, residual_of
-from smartshoe.diagnosis._lack_of_fit import repeating, slow
+from smartshoe.diagnosis._lack_of_fit import repeating_structure, slow_structure
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
 from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
 from smartshoe.models.effects import Conditions, effect
@@ -119,16 +119,16 @@ def test_correlated_samples_tell_as_much_as_the_mean_of_a_markov_process(memory:
     e = lfilter([0.002], [1.0, -memory], rng.standard_normal(60_000))
     own_sd = 0.002 / np.sqrt(1.0 - memory**2)
     parts = [e[:40_000], e[40_000:]]
-    found = correlated_sd(parts, [np.ones(part.size, dtype=bool) for part in parts])
+    found = effective_noise_sd(parts, [np.ones(part.size, dtype=bool) for part in parts])
     assert found == pytest.approx(own_sd * np.sqrt((1.0 + memory) / (1.0 - memory)), rel=0.15)
 
 
 def test_structure_counts_once_a_correlation_time() -> None:
     slow = np.sin(np.linspace(0.0, 6.0 * np.pi, 3000))
     everywhere = np.ones(slow.size, dtype=bool)
-    fine = correlated_sd([np.repeat(slow, 10)], [np.ones(10 * slow.size, dtype=bool)])
+    fine = effective_noise_sd([np.repeat(slow, 10)], [np.ones(10 * slow.size, dtype=bool)])
     # Ten times the samples of the same course tell no more: the information n / sd^2 stays.
-    assert fine == pytest.approx(np.sqrt(10.0) * correlated_sd([slow], [everywhere]), rel=0.02)
+    assert fine == pytest.approx(np.sqrt(10.0) * effective_noise_sd([slow], [everywhere]), rel=0.02)
 
 
 # -- baseline and fits --------------------------------------------------------------------------------------------
@@ -173,8 +173,8 @@ def test_noise_of_any_colour_is_not_taken_for_structure(seed: int, share: float,
     for k in range(1, n):
         coloured[k] = keep * coloured[k - 1] + np.sqrt(1 - keep**2) * rng.standard_normal()
     noise = 0.001 * (np.sqrt(1 - share) * rng.standard_normal(n) + np.sqrt(share) * coloured)
-    assert not repeating(sessions, [noise], Thresholds()).significant
-    assert not slow(sessions, [noise], Thresholds()).significant
+    assert not repeating_structure(sessions, [noise], Thresholds()).significant
+    assert not slow_structure(sessions, [noise], Thresholds()).significant
 
 
 def test_what_repeats_and_what_wanders_are_seen() -> None:
@@ -183,8 +183,8 @@ def test_what_repeats_and_what_wanders_are_seen() -> None:
     noise = 0.0005 * np.random.default_rng(1).standard_normal(at.load.size)
     bow = 0.002 * at.load * (1 - at.load)
     wander = 0.001 * np.sin(2 * np.pi * at.time_s / 47.0)
-    assert repeating(sessions, [noise + bow], Thresholds()).z > 10.0
-    seen = slow(sessions, [noise + wander], Thresholds())
+    assert repeating_structure(sessions, [noise + bow], Thresholds()).z > 10.0
+    seen = slow_structure(sessions, [noise + wander], Thresholds())
     assert seen.z > 5.0
     assert seen.rms == pytest.approx(0.001 / np.sqrt(2), rel=0.2)
 
@@ -226,7 +226,7 @@ def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
     plain = baseline_of(sessions, scale)
     found = fit(likelihood_of(sessions, plain), plain)
     for made in EXPERIMENTS.values():
-        assert Contest(found, found, found).after(made(800.0), 0.02).margin == pytest.approx(0.0, abs=0.1)
+        assert Contest(found, found, found).after_experiment(made(800.0), 0.02).margin == pytest.approx(0.0, abs=0.1)
 
 
 def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
@@ -238,23 +238,23 @@ def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     lag = fit(likelihood, start.with_part(effect("sensor_lag"), np.array([0.02, 0.1])))
     delay = fit(likelihood, start.with_part(effect("delay"), np.array([0.02])))
     now = Contest(lag, delay, fit(likelihood, start))
-    margins = {name: now.after(EXPERIMENTS[name](800.0), 0.02).margin for name in ("steps", "rates", "idle")}
+    margins = {name: now.after_experiment(EXPERIMENTS[name](800.0), 0.02).margin for name in ("steps", "rates", "idle")}
     assert margins["steps"] > 2 * margins["rates"]
     assert margins["steps"] > 2 * margins["idle"]
     for name, margin in margins.items():  # whether it is asked for or not, it grows by as much
         grown = margin - now.margin
-        assert now.after(EXPERIMENTS[name](800.0), 0.02, 1.01 * grown) is None
-        assert now.after(EXPERIMENTS[name](800.0), 0.02, 0.99 * grown).margin == margin
+        assert now.after_experiment(EXPERIMENTS[name](800.0), 0.02, 1.01 * grown) is None
+        assert now.after_experiment(EXPERIMENTS[name](800.0), 0.02, 0.99 * grown).margin == margin
     for name in ("steps", "idle"):  # whatever the rival were fitted to, it cannot miss more than it does as it is
-        before = Contest(lag, lag, now.without).after(EXPERIMENTS[name](800.0), 0.02, 1.0)
+        before = Contest(lag, lag, now.without).after_experiment(EXPERIMENTS[name](800.0), 0.02, 1.0)
         assert before is None
     for made in EXPERIMENTS.values():  # what is passed over by its bound would not have come as far
-        then = now.after(made(800.0), 0.02)
-        assert now.after(made(800.0), 0.02, of_use=0.999 * then.log_odds) is not None
+        then = now.after_experiment(made(800.0), 0.02)
+        assert now.after_experiment(made(800.0), 0.02, min_log_odds=0.999 * then.log_odds) is not None
     alike = Contest(lag, fit(likelihood, lag.model.with_part(effect("zero_drift")), 1), now.without)
     for made in EXPERIMENTS.values():
-        most = alike.after(made(800.0), 0.02).log_odds
-        assert alike.after(made(800.0), 0.02, of_use=1.0) is None
+        most = alike.after_experiment(made(800.0), 0.02).log_odds
+        assert alike.after_experiment(made(800.0), 0.02, min_log_odds=1.0) is None
         assert most < 1.0
 
 

@@ -46,14 +46,14 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
     assert seen["names_of"][1] == {
-        "is_clocked": False, "is_unsteady": False, "alone": None,
+        "is_clocked": False, "is_unsteady": False, "best_single": None,
     }  # fmt: skip
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert seen["zeros_of"][0][6] == ("wanders", STANDARD.hold_s)
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
     assert seen["next_experiment"][1] == {"open_": False, "worse": False}  # as little is left as is explained
-    assert seen["inferred"][0][4] is True
+    assert seen["infer_with_gas_check"][0][4] is True
 
 
 def test_the_sentence_is_told_what_is_in_the_model_and_what_is_left(parts: Any) -> None:
@@ -61,7 +61,7 @@ def test_the_sentence_is_told_what_is_in_the_model_and_what_is_left(parts: Any) 
     told = run_diagnosis(parts)
     (causes, unnamed), _ = parts.seen["names_in"]
     assert ([one.name for one in causes], unnamed, told.minor) == (["linear_leak"], 1, ("delay",))
-    assert parts.seen["not_explained_of"][0] == (parts.kinds[1], 0.0, 0.0, STANDARD)
+    assert parts.seen["unexplained_remark"][0] == (parts.kinds[1], 0.0, 0.0, STANDARD)
     assert "not_shown_to_be_noise" not in parts.seen
     given, named = parts.seen["sentence_of"]
     assert given == ("explained", "names", BEFORE, AFTER, "left", STANDARD)

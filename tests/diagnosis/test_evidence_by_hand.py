@@ -15,11 +15,11 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._search import additions, allowed, search, step
+from smartshoe.diagnosis._search import best_additions, best_step, is_admissible, search
 from smartshoe.diagnosis._sensitivity import Linearised, departures, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Session, prepare
-from smartshoe.diagnosis._state import searched, state_at, with_members
-from smartshoe.diagnosis._validation import apart, error_of
+from smartshoe.diagnosis._state import linearised_search, state_at, with_members
+from smartshoe.diagnosis._validation import error_of, rms_difference
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -91,7 +91,7 @@ class _Twin:
 
     def prior(self, members: tuple[int, ...]) -> Array:
         sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.imperfection)
-        sds[: self.given.own] = 1.0
+        sds[: self.given.baseline_count] = 1.0
         for one in self.given.candidates:
             if one.effect.why_unnamed:  # what no law does is no small imperfection
                 sds[[c - 1 for c in one.columns]] = 0.0
@@ -117,7 +117,7 @@ class _Twin:
         """What a member adds to the reading beyond what the baseline and the nuisances follow, least squares."""
         given = self.given
         (column,) = given.candidates[member].columns
-        own = [rows[:, 1 : 1 + given.own] for rows in given.rows]
+        own = [rows[:, 1 : 1 + given.baseline_count] for rows in given.rows]
         pasts = [nuisances(s, given.model.pole_per_s) for s in given.sessions]
         wide = np.zeros((self.rows.shape[0], 2 * len(pasts)))
         first = 0
@@ -127,20 +127,22 @@ class _Twin:
         beside = np.column_stack([self.seen(own), wide])
         found = np.linalg.lstsq(beside, self.rows[:, column], rcond=None)[0]
         return [
-            rows[:, column] - one @ found[: given.own] - past @ found[given.own + 2 * k : given.own + 2 * k + 2]
+            rows[:, column]
+            - one @ found[: given.baseline_count]
+            - past @ found[given.baseline_count + 2 * k : given.baseline_count + 2 * k + 2]
             for k, (rows, one, past) in enumerate(zip(given.rows, own, pasts, strict=True))
         ]
 
     def posterior(self, members: tuple[int, ...]) -> tuple[float, Array, dict[int, float]]:
         """The density with members whose equations depart in proportion to their sizes, these found in two rounds."""
-        found, mean, departed = self.cost(members, {})
+        found, mean, departure_sds = self.cost(members, {})
         made = {m: self.seen(departures(self.given, self.signature(m))) for m in members}
         for _ in range(2):
             amounts = {m: abs(mean[self.given.candidates[m].columns[0] - 1]) for m in members}
             limits = self.given.thresholds
             parts = {m: (made[m], limits.departure * amounts[m] / made[m].shape[1] ** 0.5) for m in members}
-            found, mean, departed = self.cost(members, parts)
-        return found, mean, departed
+            found, mean, departure_sds = self.cost(members, parts)
+        return found, mean, departure_sds
 
 
 # -- evidence -------------------------------------------------------------------------------------------------------
@@ -153,10 +155,10 @@ def test_an_equation_departs_in_proportion_to_its_size(given: Linearised, eviden
     plain = [score.score - evidence.odds_of(score.members) for score in fast]
     # Both are known up to one constant.
     assert_allclose(np.diff(plain), np.diff([cost for cost, _, _ in slow]), rtol=1e-3, atol=0.1)
-    for (_, mean, departed), posterior in zip(slow, fast, strict=True):
+    for (_, mean, departure_sds), posterior in zip(slow, fast, strict=True):
         expected = [mean[given.candidates[m].columns[0] - 1] for m in posterior.members]
         assert_allclose([float(s[0]) for s in posterior.strengths], expected, rtol=1e-2, atol=1e-6)
-        assert posterior.departed == pytest.approx([departed[m] for m in posterior.members], rel=0.02)
+        assert posterior.departure_sds == pytest.approx([departure_sds[m] for m in posterior.members], rel=0.02)
 
 
 def test_a_member_that_stands_by_itself_departs_little_and_moves_the_reading_by_what_it_explains(
@@ -164,7 +166,7 @@ def test_a_member_that_stands_by_itself_departs_little_and_moves_the_reading_by_
 ) -> None:
     right = _number(given, "gas_compression")
     found = evidence.posterior((right,))
-    assert found.departed[0] < 1.0
+    assert found.departure_sds[0] < 1.0
     assert found.together == pytest.approx(found.sizes[0])
     # What the baseline, fitted anew, leaves of the effect.
     twin = _Twin(given, SD)
@@ -174,12 +176,12 @@ def test_a_member_that_stands_by_itself_departs_little_and_moves_the_reading_by_
 
 def test_departures_made_at_once_are_those_made_one_after_another(given: Linearised) -> None:
     after, once = Evidence(given, SD), Evidence(given, SD)
-    once.make_ready((9, 2, 5, 2))
-    once.make_ready(())
+    once.prepare_departures((9, 2, 5, 2))
+    once.prepare_departures(())
     for members in ((2,), (2, 5), (2, 5, 9), (5, 11)):
         one, other = after.posterior(members), once.posterior(members)
         assert other.score == pytest.approx(one.score, rel=1e-9)
-        assert other.departed == pytest.approx(one.departed, rel=1e-6, abs=1e-9)
+        assert other.departure_sds == pytest.approx(one.departure_sds, rel=1e-6, abs=1e-9)
 
 
 def test_an_extension_of_a_set_scores_as_the_set_whose_new_equation_is_exact(
@@ -209,10 +211,12 @@ def test_of_several_strengths_the_departures_are_of_the_likeliest(given: Lineari
     several = [one.columns for one in given.candidates if len(one.columns) > 1]
     assert several
     for columns in several:
-        index = [*range(1, 1 + given.own), *columns]
-        prior = np.diag([OWN_SD] * given.own + [given.thresholds.strength_sd**-2] * len(columns))
+        index = [*range(1, 1 + given.baseline_count), *columns]
+        prior = np.diag([OWN_SD] * given.baseline_count + [given.thresholds.strength_sd**-2] * len(columns))
         known = by_noise[:, index].T
-        strengths = np.linalg.solve(known @ twin.rows[:, index] + prior, known @ twin.rows[:, 0])[given.own :]
+        strengths = np.linalg.solve(known @ twin.rows[:, index] + prior, known @ twin.rows[:, 0])[
+            given.baseline_count :
+        ]
         assert_allclose(evidence._direction(columns), strengths / np.linalg.norm(strengths), rtol=0.0, atol=1e-3)
 
 
@@ -241,9 +245,9 @@ def test_the_best_set_is_better_than_all_that_one_change_makes_of_it(two: tuple[
     assert "rate_gain" in {given.candidates[m].name for m in best.members}
     for member in best.members:
         assert evidence.posterior(tuple(m for m in best.members if m != member)).score > best.score
-    for k in additions(evidence, best.members, 100):
+    for k in best_additions(evidence, best.members, 100):
         more = evidence.posterior((*best.members, k))
-        assert more.score >= best.score - 1e-6 or not allowed(evidence, more)
+        assert more.score >= best.score - 1e-6 or not is_admissible(evidence, more)
     assert search(evidence, best.members).members == best.members
     # From a wrong start it comes back: by a swap.
     wrong = _number(given, "linear_leak")
@@ -252,10 +256,10 @@ def test_the_best_set_is_better_than_all_that_one_change_makes_of_it(two: tuple[
 
 def test_a_step_is_one_change_and_never_for_the_worse(two: tuple[Linearised, Evidence]) -> None:
     _, evidence = two
-    first = step(evidence)
+    first = best_step(evidence)
     assert len(first.members) == 1
     assert first.score < evidence.posterior(()).score
-    second = step(evidence, first.members)
+    second = best_step(evidence, first.members)
     assert len(set(second.members) ^ set(first.members)) in (1, 2)
     assert second.score <= first.score
 
@@ -264,7 +268,7 @@ def test_additions_are_one_an_effect_best_first_without_what_is_taken_or_banned(
     two: tuple[Linearised, Evidence],
 ) -> None:
     given, evidence = two
-    found = additions(evidence, (), 100)
+    found = best_additions(evidence, (), 100)
     names = [given.candidates[k].name for k in found]
     assert len(set(names)) == len(names)
     scores = {k: score for score, k, _ in evidence.extensions(())}
@@ -273,11 +277,11 @@ def test_additions_are_one_an_effect_best_first_without_what_is_taken_or_banned(
         own = [scores[j] for j, one in enumerate(given.candidates) if one.name == given.candidates[k].name]
         signed = [one for one in own if one < scores[k]]
         assert len(given.candidates[k].columns) > 1 or not signed or given.candidates[k].effect.parameters[0].lower == 0
-    assert additions(evidence, (), 3) == found[:3]
+    assert best_additions(evidence, (), 3) == found[:3]
     banned = names[0]
-    assert banned not in {given.candidates[k].name for k in additions(evidence, (), 100, (banned,))}
+    assert banned not in {given.candidates[k].name for k in best_additions(evidence, (), 100, (banned,))}
     taken = given.candidates[found[0]].slot
-    assert taken not in {given.candidates[k].slot for k in additions(evidence, (found[0],), 100)}
+    assert taken not in {given.candidates[k].slot for k in best_additions(evidence, (found[0],), 100)}
 
 
 def test_a_strength_that_physics_forbids_is_not_allowed() -> None:
@@ -288,17 +292,17 @@ def test_a_strength_that_physics_forbids_is_not_allowed() -> None:
     leak = _number(given, "linear_leak")
     found = evidence.posterior((leak,))
     assert found.strengths[0][0] < 0.0
-    assert not allowed(evidence, found)
-    assert leak not in additions(evidence, (), 100)
-    assert allowed(evidence, evidence.posterior(()))
+    assert not is_admissible(evidence, found)
+    assert leak not in best_additions(evidence, (), 100)
+    assert is_admissible(evidence, evidence.posterior(()))
 
 
 def test_effects_that_cancel_each_other_are_not_allowed(two: tuple[Linearised, Evidence]) -> None:
     _, evidence = two
     best = search(evidence)
     inflated = replace(best, sizes=tuple(1.0 for _ in best.sizes), together=0.01)
-    assert not allowed(evidence, inflated)
-    assert allowed(evidence, replace(best, sizes=tuple(0.01 for _ in best.sizes), together=0.02))
+    assert not is_admissible(evidence, inflated)
+    assert is_admissible(evidence, replace(best, sizes=tuple(0.01 for _ in best.sizes), together=0.02))
 
 
 def test_what_is_found_is_begun_with_at_about_its_size(two: tuple[Linearised, Evidence]) -> None:
@@ -319,20 +323,20 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
     given, _ = two
     plain = fit(Likelihood(given.sessions, SD, MODEL, STANDARD), MODEL)
     state = state_at(plain)
-    assert state.start == ()
-    assert state.improved == pytest.approx(state.evidence.posterior(()).score - state.best.score)
-    assert state.improved > state.evidence.odds
+    assert state.fitted_members == ()
+    assert state.score_gain == pytest.approx(state.evidence.posterior(()).score - state.best.score)
+    assert state.score_gain > state.evidence.odds
     assert state.is_worth_a_fit
-    assert [one.name for one in state.chosen] == [state.given.candidates[m].name for m in state.best.members]
+    assert [one.name for one in state.chosen] == [state.linearisation.candidates[m].name for m in state.best.members]
     large = max(state.best.sizes)
-    for linear, bends in ((0.5 * large, True), (2.0 * large, False)):
+    for linear, exceeds_linear_range in ((0.5 * large, True), (2.0 * large, False)):
         limits = replace(STANDARD, linear=linear)
         again = state_at(fit(Likelihood(given.sessions, SD, MODEL, limits), MODEL))
-        assert again.bends is bends
+        assert again.exceeds_linear_range is exceeds_linear_range
         # Only one change where it bends: the next linearisation may tell another.
-        assert (len(again.best.members) == 1) is bends
+        assert (len(again.best.members) == 1) is exceeds_linear_range
     name = state.chosen[0].name
-    _, without = searched(plain.model, given.sessions, STANDARD, (name,))
+    _, without = linearised_search(plain.model, given.sessions, STANDARD, (name,))
     assert name not in {given.candidates[m].name for m in without.members}
 
 
@@ -416,13 +420,13 @@ def test_slopes_that_are_brought_up_to_date_are_nearly_those_computed_anew(
     theta = start.theta + 0.3 * (found.model.theta - start.theta)
     moved = start.at(theta)
     likelihood.cost(moved)
-    cost, pull, normal = likelihood.nearly_normal(moved, theta - start.theta)
+    cost, pull, normal = likelihood.broyden_normal(moved, theta - start.theta)
     exact = likelihood.normal(moved)
     assert cost == pytest.approx(exact[0], rel=1e-9)
     scale = np.sqrt(np.diag(exact[2]))
     # Nearer than the slopes from before in the one direction that was gone.
-    step = (theta - start.theta) * scale
-    curved = [(one / np.outer(scale, scale)) @ step for one in (normal, before[2], exact[2])]
+    best_step = (theta - start.theta) * scale
+    curved = [(one / np.outer(scale, scale)) @ best_step for one in (normal, before[2], exact[2])]
     assert np.linalg.norm(curved[0] - curved[2]) < 0.8 * np.linalg.norm(curved[1] - curved[2])
     assert pull / scale == pytest.approx(exact[1] / scale, abs=0.1 * float(np.linalg.norm(exact[1] / scale)))
 
@@ -467,6 +471,6 @@ def test_two_models_are_apart_by_what_they_read_differently(sessions: list[Sessi
     higher = replace(MODEL, gain=1.01)
     load = np.concatenate([one.conditions.load[one.fitted] for one in sessions])
     # A held unit reads its load; each recording's own offset takes the mean out.
-    assert apart(sessions, MODEL, higher) == pytest.approx(0.01 * float(np.std(load)), rel=0.1)
-    assert apart(sessions, MODEL, MODEL) == 0.0
+    assert rms_difference(sessions, MODEL, higher) == pytest.approx(0.01 * float(np.std(load)), rel=0.1)
+    assert rms_difference(sessions, MODEL, MODEL) == 0.0
     assert error_of(sessions, TRUTH) < SD < error_of(sessions, MODEL)

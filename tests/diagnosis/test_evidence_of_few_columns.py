@@ -116,10 +116,10 @@ class _Twin:
             columns.append(self.rows[:, list(COLUMNS[member])])
             spans[member] = slice(variances.size, variances.size + len(COLUMNS[member]))
             variances = np.append(variances, np.full(len(COLUMNS[member]), STRENGTH**2))
-        departed = {}
+        departure_sds = {}
         for member in members if amounts is not None else ():
             made = self.seen(departures(self.given, self.departing(self.direction(COLUMNS[member]))))
-            departed[member] = slice(variances.size, variances.size + made.shape[1])
+            departure_sds[member] = slice(variances.size, variances.size + made.shape[1])
             assert amounts is not None
             sd = max(DEPARTURE * amounts[member] / math.sqrt(made.shape[1]), 1e-7)
             columns.append(made)
@@ -134,7 +134,7 @@ class _Twin:
         pull = np.linalg.solve(inner, asked)
         score = float(self.y @ self.weight @ self.y - asked @ pull + np.linalg.slogdet(inner)[1])
         strengths = {m: pull[at] * STRENGTH for m, at in spans.items()}
-        return score, strengths, {m: float(np.sqrt(np.mean(pull[at] ** 2))) for m, at in departed.items()}
+        return score, strengths, {m: float(np.sqrt(np.mean(pull[at] ** 2))) for m, at in departure_sds.items()}
 
     def posterior(
         self, members: tuple[int, ...], of_any_law: bool = False
@@ -186,26 +186,26 @@ def test_a_sets_evidence_is_that_of_its_density_to_the_digit(
     found, slow = evidence.posterior(members), twin.posterior(members)
     wider, slow_wider = evidence.posterior(members, of_any_law=True), twin.posterior(members, of_any_law=True)
     assert wider.score - odds == pytest.approx(slow_wider[0], rel=1e-6)
-    assert wider.departed == pytest.approx([slow_wider[2][m] for m in members], rel=1e-4)
+    assert wider.departure_sds == pytest.approx([slow_wider[2][m] for m in members], rel=1e-4)
     assert found.score - odds == pytest.approx(slow[0], rel=1e-6)
     assert found.members == members
     for k, member in enumerate(members):
         assert found.strengths[k] == pytest.approx(slow[1][member], rel=1e-4)
-        assert found.departed[k] == pytest.approx(slow[2][member], rel=1e-4)
+        assert found.departure_sds[k] == pytest.approx(slow[2][member], rel=1e-4)
         assert found.sizes[k] == pytest.approx(twin.visible((member,), slow[1]), rel=1e-4)
     if members:
         assert found.together == pytest.approx(twin.visible(members, slow[1]), rel=1e-4)
-        assert exact.departed == (0.0,) * len(members)
+        assert exact.departure_sds == (0.0,) * len(members)
 
 
 @pytest.mark.parametrize("members", [(), (0,), (1,), (0, 2), (0, 1, 2)])
 def test_of_whole_effects_the_evidence_is_that_of_its_density_too(given: Linearised, members: tuple[int, ...]) -> None:
     found = Evidence(given, SD).of_whole_effects.posterior(members)
-    score, strengths, departed = _TwinOfWholeEffects(given).posterior(members)
+    score, strengths, departure_sds = _TwinOfWholeEffects(given).posterior(members)
     assert found.score - sum(ODDS + SHAPES[m] for m in members) == pytest.approx(score, rel=1e-6)
     for k, member in enumerate(members):
         assert found.strengths[k] == pytest.approx(strengths[member], rel=1e-4)
-        assert found.departed[k] == pytest.approx(departed[member], rel=1e-4)
+        assert found.departure_sds[k] == pytest.approx(departure_sds[member], rel=1e-4)
 
 
 def test_a_curve_that_a_gain_leaves_where_it_grows_more_at_high_loads_is_no_evidence(given: Linearised) -> None:

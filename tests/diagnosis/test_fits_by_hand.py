@@ -193,7 +193,7 @@ def test_costs_slopes_and_those_brought_up_to_date_are_of_written_out_matrices()
         slopes = row[:, 1:] + np.outer(row[:, 0] - off - row[:, 1:] @ by, weighed) / float(weighed @ by)
         assert slopes @ by == pytest.approx(row[:, 0] - off)  # what the step did
         renewed.append(np.column_stack([off, slopes]))
-    alike(likelihood.nearly_normal(moved, by), products(renewed, moved))
+    alike(likelihood.broyden_normal(moved, by), products(renewed, moved))
     # Slopes of a model that was judged begin with its own readings.
     likelihood.cost(moved)
     alike(likelihood.normal(moved), products([
@@ -225,10 +225,10 @@ def test_a_fit_that_only_tells_how_much_better_another_is_ends_when_that_is_know
     exactly = len(taken)
     taken.clear()
     much_better = best.cost - 1e4 * (cost(far) - best.cost)
-    assert fit(likelihood, far, beside=much_better).cost > best.cost
+    assert fit(likelihood, far, best_cost=much_better).cost > best.cost
     assert len(taken) == 1 < exactly  # nothing that it could gain would matter
     taken.clear()
-    near = fit(likelihood, far, beside=best.cost)
+    near = fit(likelihood, far, best_cost=best.cost)
     assert len(taken) <= exactly
     assert near.cost - best.cost < 0.02 * (cost(far) - best.cost) + 0.1
 
@@ -265,7 +265,7 @@ def test_a_factor_of_what_rounding_has_made_indefinite_is_nearly_its_own() -> No
 
 def test_the_direction_of_several_strengths_is_of_unit_length() -> None:
     gram = np.diag([1.0, 10.0, 1e4, 4e4])
-    known: Any = SimpleNamespace(gram=gram, given=SimpleNamespace(own=1), thresholds=STANDARD)
+    known: Any = SimpleNamespace(gram=gram, linearisation=SimpleNamespace(baseline_count=1), thresholds=STANDARD)
     assert Evidence._direction(known, [2, 3]) == pytest.approx([math.sqrt(0.5)] * 2)  # nothing is asked for
     gram[0, 1:] = gram[1:, 0] = [3.0, 50.0, 60.0]
     wide = 1.0 / STANDARD.strength_sd**2
@@ -276,12 +276,12 @@ def test_the_direction_of_several_strengths_is_of_unit_length() -> None:
 def test_departures_are_as_wide_as_their_members_strengths_and_never_nothing() -> None:
     candidates = [SimpleNamespace(columns=(4,)), SimpleNamespace(columns=(5, 6)), SimpleNamespace(columns=(7,))]
     known: Any = SimpleNamespace(
-        given=SimpleNamespace(candidates=candidates), thresholds=STANDARD, _directions=9,
+        linearisation=SimpleNamespace(candidates=candidates), thresholds=STANDARD, _directions=9,
         _departures_of=lambda members: [range(20 + 9 * one, 29 + 9 * one) for one in members],
     )  # fmt: skip
-    index, sds = Evidence._widened(known, (0, 1), None)
+    index, sds = Evidence._columns_and_sds(known, (0, 1), None)
     assert (list(index), list(sds)) == ([4, 5, 6], [0.03] * 3)
-    index, sds = Evidence._widened(known, (1, 2), [np.array([0.03, -0.04]), np.zeros(1)])
+    index, sds = Evidence._columns_and_sds(known, (1, 2), [np.array([0.03, -0.04]), np.zeros(1)])
     assert list(index) == [5, 6, 7, *range(29, 47)]
     assert list(sds) == pytest.approx([0.03] * 3 + [0.25 / 3.0 * 0.05] * 9 + [1e-7] * 9)
     visible: Any = SimpleNamespace(raw=np.diag([0.0, 4.0, -9.0]))
@@ -313,7 +313,7 @@ class _Told:
         self.asked.append(("anew", float(model.theta[0])))
         return self._products(model)
 
-    def nearly_normal(self, model: _Slope, step: Array) -> tuple[float, Array, Array]:
+    def broyden_normal(self, model: _Slope, step: Array) -> tuple[float, Array, Array]:
         self.asked.append(("renewed", float(step[0])))
         return self._products(model)
 

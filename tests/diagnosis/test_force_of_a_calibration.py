@@ -17,16 +17,16 @@ from smartshoe.diagnosis import Thresholds, _force
 from smartshoe.diagnosis._force import (
     Compensation,
     ForceError,
-    as_calibrated,
-    clipped_of,
     compensation,
     force_error,
-    force_of,
-    held_of,
-    late_of,
-    not_undone_of,
+    limit_calibration_off,
+    limit_clipped,
+    limit_drift_held,
+    limit_force,
+    limit_latency_left,
+    limit_not_undone,
 )
-from smartshoe.diagnosis._procedure import _held
+from smartshoe.diagnosis._procedure import _with_held_drifts
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import mean_offset
 from smartshoe.models.effects import effect
@@ -66,7 +66,7 @@ def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
         assert found.model is MODEL or is_run
         assert found.is_plain is not is_run
         assert (found.before, found.whole) == tuple(force_error([seen], model) for model in (MODEL, bent))
-        said = force_of(found)
+        said = limit_force(found)
         assert (said == []) is is_run
         assert is_run or "compensates by the baseline, and its twin simulates with the effects" in said[0]
 
@@ -82,7 +82,7 @@ def test_a_lag_is_not_undone_where_that_makes_more_of_the_noise_than_it_takes_of
         assert {*found.model.names} == {*bent.names} - {*left}
         assert found.error.fitted_n == pytest.approx(force_error([seen], found.model).fitted_n)
         assert found.error.fitted_n < found.before.fitted_n
-        said = force_of(found)
+        said = limit_force(found)
         assert bool(said) is bool(left)
         assert not left or said[0].startswith("the calibration does not undo sensor lag, which would make more of")
 
@@ -100,7 +100,7 @@ def test_a_force_that_is_worse_on_what_is_held_out_is_the_plain_models(
     assert found.rejected == (extended if is_plain else None)
     assert found.error == (before if is_plain else extended)
     told = "baseline's on held-out data (9 to 9.3 N): the calibration compensates by the baseline"
-    assert (told in str(force_of(found))) is is_plain
+    assert (told in str(limit_force(found))) is is_plain
 
 
 def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
@@ -114,10 +114,10 @@ def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
     assert not found.is_plain
     assert found.error.fitted_n < 0.1 * found.before.fitted_n
     assert force_error([seen], clipped).fitted_n > 10.0 * found.error.fitted_n  # with the clipped ones
-    (said,) = clipped_of(found)
+    (said,) = limit_clipped(found)
     lost_share = np.mean(np.abs(MODEL.simulate(one.conditions) - seen.reading) >= STANDARD.tolerable)
     assert said.startswith(f"errors of the force leave out {100.0 * lost_share:.2g} % of samples")
-    assert clipped_of(compensation([one], MODEL, MODEL, STANDARD)) == []
+    assert limit_clipped(compensation([one], MODEL, MODEL, STANDARD)) == []
     # Nor do they move the zero: the filter does not undo the clipping, and with them it lies below.
     assert found.zero == pytest.approx(0.0, abs=1e-4)
     assert mean_offset([seen], found.undone) < -0.01
@@ -135,12 +135,12 @@ def test_a_force_that_is_hardly_worse_decides_nothing(
 
 def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
-    (said,) = not_undone_of(late, 0.02)
+    (said,) = limit_not_undone(late, 0.02)
     late_by = "no compensator takes off the delay, since a stream of readings cannot be moved to another time"
     assert said.startswith(late_by)
-    (said,) = not_undone_of(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
+    (said,) = limit_not_undone(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
     assert said.startswith("no compensator takes off the clock drift, since ")
-    assert not_undone_of(late.without("delay"), 0.02) == []
+    assert limit_not_undone(late.without("delay"), 0.02) == []
 
 
 def test_a_drift_that_is_held_is_said_to_be(one: Session) -> None:
@@ -151,7 +151,7 @@ def test_a_drift_that_is_held_is_said_to_be(one: Session) -> None:
     def told(model: ExtendedModel) -> list[str]:
         nothing = ForceError(0.0, 0.0)
         undone_by = ExtendedCompensator(model, 1.0 / one.conditions.step_s)
-        return held_of(Compensation([one], model, nothing, nothing, nothing, undone_by), STANDARD)
+        return limit_drift_held(Compensation([one], model, nothing, nothing, nothing, undone_by), STANDARD)
 
     (said,) = told(drifting.held_after(200.0, ()))
     assert "up to 200 s, the end of what was fitted, and holds it from then on" in said
@@ -170,18 +170,18 @@ def test_a_drift_that_is_no_named_law_is_held_from_the_end_of_what_was_fitted_on
         conditions=replace(one.conditions, time_s=one.conditions.time_s + 100.0),
         held_out=np.ones_like(one.held_out),
     )
-    held = _held(drifting, named, [one, longer])
+    held = _with_held_drifts(drifting, named, [one, longer])
     assert {part.name: part.until_s for part in held.parts} == {
         "gain_drift": one.conditions.time_s[-1], "zero_drift": math.inf, "linear_leak": math.inf,
     }  # fmt: skip
     last = replace(one, held_out=np.arange(one.reading.size) >= 100)  # a load cycle that judges
-    assert _held(drifting, named, [last]).part("gain_drift").until_s == one.conditions.time_s[99]
+    assert _with_held_drifts(drifting, named, [last]).part("gain_drift").until_s == one.conditions.time_s[99]
     carried_on = replace(one, conditions=replace(one.conditions, before={"time_s": 50.0}))
-    held = _held(drifting, named, [one, carried_on])
+    held = _with_held_drifts(drifting, named, [one, carried_on])
     assert held.part("gain_drift").until_s == 50.0 + one.conditions.time_s[-1]
     of_free_form: Any = SimpleNamespace(names=[name_of("gain_drift")])
     free = MODEL.with_part("flexible_gain_drift")
-    assert _held(free, of_free_form, [one]).parts[0].until_s == one.conditions.time_s[-1]
+    assert _with_held_drifts(free, of_free_form, [one]).parts[0].until_s == one.conditions.time_s[-1]
 
 
 def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Session) -> None:
@@ -191,17 +191,17 @@ def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Sessi
     undone_by = ExtendedCompensator(late, 1.0 / one.conditions.step_s)
     (left_s,) = undone_by.lags_left_s.values()
     found = Compensation([one], late, nothing, nothing, nothing, undone_by)
-    (said,) = late_of(found)
+    (said,) = limit_latency_left(found)
     assert said.startswith(f"the calibration leaves {1e3 * left_s:.3g} ms of the sensor lag")
-    assert late_of(replace(found, filter=ExtendedCompensator(MODEL, 1.0 / one.conditions.step_s))) == []
+    assert limit_latency_left(replace(found, filter=ExtendedCompensator(MODEL, 1.0 / one.conditions.step_s))) == []
     quick = replace(one, reading=late.simulate(one.conditions))
     found = replace(found, fine=[quick], error=few)
-    (said,) = as_calibrated(found, STANDARD)
+    (said,) = limit_calibration_off(found, STANDARD)
     off_n = force_error([quick], late).fitted_n
     assert off_n > STANDARD.clear * STANDARD.tolerable * late.full_scale_load_n
     assert said.startswith(f"the force of {one.recording.name} is off by {off_n:.2g} N (rms): the 0.1")
     for held_n in (off_n / STANDARD.clear * 1.01, np.nan):  # nearly as far off as what is held out, or none is
-        assert as_calibrated(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
+        assert limit_calibration_off(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
 
 
 @pytest.mark.parametrize(

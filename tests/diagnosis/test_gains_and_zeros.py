@@ -19,18 +19,18 @@ from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gains_and_zeros import (
     OwnGain,
     ZeroChange,
-    _Gained,
     _loaded_about,
+    _OwnTerms,
     changes_of,
-    foretells,
     gains_of,
     may_differ,
+    predicts_better,
     time_of,
     with_changes,
-    with_likelier_gains,
+    with_own_terms,
     zero_changes_of,
 )
-from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._held_out import own_terms_of
 from smartshoe.diagnosis._jumps import MOMENTS, any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._scale import Scale
@@ -91,7 +91,7 @@ def _wide(sessions: list[Session], model: ExtendedModel) -> tuple[Array, ...]:
 def _density(given: Linearised, sessions: list[Session], member: int | None) -> float:
     """-2 log density of the target, every prior written out in one covariance; the equation exact."""
     prior = np.full(given.rows[0].shape[1] - 1, STANDARD.imperfection)
-    prior[: given.own] = 1.0
+    prior[: given.baseline_count] = 1.0
     for one in given.candidates:
         prior[[c - 1 for c in one.columns]] *= not one.effect.why_unnamed
     if member is not None:
@@ -116,7 +116,7 @@ def test_evidence_with_and_without_gains_differs_as_the_explicit_densities_do(
     for member in (None, curve):
         members = () if member is None else (member,)
         # Of one equation that is taken for exact: departures are no matter of gains.
-        fast = [one.score_beside(members) - one.posterior(members).score + taken_for_exact(one, members).score
+        fast = [one.comparable_score(members) - one.posterior(members).score + taken_for_exact(one, members).score
                 for one in (plain, beside)]  # fmt: skip
         slow = [_density(given, some, member) for some in (sessions, gained)]
         assert fast[0] - fast[1] == pytest.approx(slow[0] - slow[1], abs=0.1 + 1e-4 * abs(slow[0] - slow[1]))
@@ -143,7 +143,7 @@ def test_gains_and_the_effect_beside_them_come_out_of_a_fit(gained: list[Session
 
 def test_without_gains_the_offset_and_past_are_all_that_is_a_recordings_own(sessions: list[Session]) -> None:
     for one in sessions:
-        own, added = own_of(one, MODEL, one.reading - MODEL.simulate(one.conditions))
+        own, added = own_terms_of(one, MODEL, one.reading - MODEL.simulate(one.conditions))
         assert own.size == 2
         assert added.shape == one.reading.shape
 
@@ -159,7 +159,7 @@ def test_gains_are_asked_for_where_more_is_left_than_imperfections_or_something_
     assert may_differ(_state(CURVED.with_part("cycle_conditioning"), alike), alike)
     alone = _sessions(_run(0, 0.02))
     assert may_differ(_state(MODEL, alone), alone)  # its zero may jump
-    assert with_likelier_gains(_state(MODEL, alone), alone) is None  # and it has no gain of its own
+    assert with_own_terms(_state(MODEL, alone), alone) is None  # and it has no gain of its own
     in_place = _sessions(_run(0, 0.02), _run(1, -0.02, continues="run_0"))
     assert not may_differ(_state(CURVED, in_place), in_place)
 
@@ -179,7 +179,7 @@ def test_gains_are_told_where_they_account_for_most_of_what_is_left(
 ) -> None:
     sessions = _sessions(*(_run(k, gain) for k, gain in enumerate(gains)))
     state = _state(found, sessions)
-    assert (with_likelier_gains(state, sessions) is not None) is is_told
+    assert (with_own_terms(state, sessions) is not None) is is_told
 
 
 def test_gains_take_the_place_of_drifts_that_make_no_more_of_the_data() -> None:
@@ -187,7 +187,7 @@ def test_gains_take_the_place_of_drifts_that_make_no_more_of_the_data() -> None:
     sessions = _sessions(_run(0, 0.015), _run(1, -0.015))
     model = CURVED.with_part("gain_drift").with_part("cycle_conditioning")
     state = _state(model, sessions)
-    told = with_likelier_gains(state, sessions)
+    told = with_own_terms(state, sessions)
     assert told is not None
     assert all(one.own_gain_sd and not one.gain_changes for one in told)
 
@@ -198,7 +198,7 @@ def test_a_gain_that_changes_is_told_with_the_moment() -> None:
     reading = runs[1].sensors[0]
     values = reading.values * np.where(runs[1].time_s >= 21.0, 1.04, 1.0)
     gained = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
-    while (likelier := with_likelier_gains(_state(CURVED, gained), gained)) is not None:
+    while (likelier := with_own_terms(_state(CURVED, gained), gained)) is not None:
         gained = likelier  # gains of their own first, then in what is found beside them what changes
     assert [len(one.gain_changes) for one in gained] == [0, 1, 0]
     model = fit(Likelihood(gained, SD, CURVED, STANDARD), CURVED).model
@@ -234,7 +234,7 @@ def test_a_wall_that_conditions_as_its_load_turns_does_not_slip() -> None:
     for some in (sessions, gained):
         start = CURVED.with_part(conditioning, conditioning.begun())
         state = state_at(fit(Likelihood(some, SD, start, STANDARD), start))
-        told = with_likelier_gains(state, some) or some
+        told = with_own_terms(state, some) or some
         assert not any(one.gain_changes for one in told)
 
 
@@ -278,11 +278,11 @@ def test_zeros_that_change_are_told_with_the_moment_and_are_no_gains() -> None:
     reading, time_s = runs[1].sensors[0], runs[1].time_s
     values = reading.values + SPAN_MBAR * (0.015 * (time_s >= 14.0) - 0.01 * (time_s >= 28.0))
     sessions = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
-    told = with_likelier_gains(_state(CURVED, sessions), sessions)
+    told = with_own_terms(_state(CURVED, sessions), sessions)
     assert told is not None
     assert [len(one.zero_changes) for one in told] == [0, 2, 0]
     assert not any(one.own_gain_sd or one.gain_changes for one in told)
-    assert with_likelier_gains(_state(CURVED, list(told)), told) is None
+    assert with_own_terms(_state(CURVED, list(told)), told) is None
     model = fit(Likelihood(told, SD, CURVED, STANDARD), CURVED).model
     assert not gains_of(told, model, STANDARD)
     first, second = zero_changes_of(told, model)  # the largest first
@@ -301,11 +301,13 @@ def test_beside_gains_an_extension_must_follow_and_beside_changes_it_must_forese
     curved, wrong = (fit(Likelihood(sessions, SD, MODEL, STANDARD), MODEL.with_part(effect(name), values), 1).model
                      for name, values in (("gas_compression", [0.2]), ("permanent_set", [0.002, 1.0])))  # fmt: skip
     for beside in (gained, changing):
-        assert foretells(curved, MODEL, state, sessions, beside)
+        assert predicts_better(curved, MODEL, state, sessions, beside)
     worse = MODEL.with_part(effect("permanent_set"), np.array([0.02, 1.0]))
-    assert not foretells(worse, MODEL, state, sessions, gained)
-    assert foretells(wrong, MODEL, state, sessions, gained) is (error_of(sessions, wrong) < error_of(sessions, MODEL))
-    assert not foretells(wrong, MODEL, state, sessions, changing)  # it does away with a part of a quarter at most
+    assert not predicts_better(worse, MODEL, state, sessions, gained)
+    assert predicts_better(wrong, MODEL, state, sessions, gained) is (
+        error_of(sessions, wrong) < error_of(sessions, MODEL)
+    )
+    assert not predicts_better(wrong, MODEL, state, sessions, changing)  # it does away with a part of a quarter at most
 
 
 def test_what_one_load_cycle_reads_otherwise_is_no_zero_that_changes_and_changes_back() -> None:
@@ -314,7 +316,7 @@ def test_what_one_load_cycle_reads_otherwise_is_no_zero_that_changes_and_changes
     beside = SPAN_MBAR * 0.03 * ((time_s >= 12.0) & (time_s < 18.0))  # its load comes and goes from 10 to 20 s
     one_cycle = runs[1].with_channel(replace(reading, values=reading.values + beside))
     sessions = _sessions(runs[0], one_cycle, runs[2])
-    told = with_likelier_gains(_state(CURVED, sessions), sessions) or sessions
+    told = with_own_terms(_state(CURVED, sessions), sessions) or sessions
     for one in told:
         assert len({*one.cycle[list(one.zero_changes)]}) == len(one.zero_changes)
 
@@ -348,7 +350,7 @@ def test_where_nothing_jumps_no_moment_is_taken(monkeypatch: pytest.MonkeyPatch)
     values = run.sensors[0].values + SPAN_MBAR * 0.015 * (run.time_s >= 14.0)
     sessions = _sessions(_run(0, 0.0), run.with_channel(replace(run.sensors[0], values=values)), _run(2, 0.0))
     state = _state(CURVED, sessions)
-    found = _Gained(sessions, Evidence(state.evidence.given, SD), state.start)
+    found = _OwnTerms(sessions, Evidence(state.evidence.linearisation, SD), state.fitted_members)
     assert with_changes(state, found, of_zero=True) is not found
     monkeypatch.setattr(_gains_and_zeros, "may_jump", lambda *given: False)
     assert with_changes(state, found, of_zero=True) is found
@@ -363,8 +365,8 @@ def test_a_zero_that_changes_costs_what_its_prior_asks() -> None:
         StepColumns.of(one, np.full(one.reading.size, sd), own) for one, own in zip(sessions, moments, strict=True)
     ]
     changed = replace(given, sessions=(replace(sessions[0], zero_changes=(at,), zero_sd=sd), sessions[1]))
-    (fall,) = Evidence(given, SD).falls_beside((), steps)
-    before, after = (Evidence(one, SD).score_beside(()) for one in (given, changed))
+    (fall,) = Evidence(given, SD).score_falls_with_steps((), steps)
+    before, after = (Evidence(one, SD).comparable_score(()) for one in (given, changed))
     assert fall == pytest.approx(before - after, abs=0.01)
 
 
@@ -374,7 +376,7 @@ def test_zeros_that_hardly_change_are_not_told(by: float) -> None:
     reading = runs[1].sensors[0]
     values = reading.values + SPAN_MBAR * by * (runs[1].time_s >= 14.0)
     sessions = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
-    assert with_likelier_gains(_state(CURVED, sessions), sessions) is None
+    assert with_own_terms(_state(CURVED, sessions), sessions) is None
 
 
 @pytest.mark.parametrize("is_changed", [True, False])
@@ -391,8 +393,8 @@ def test_what_a_step_takes_off_a_score_is_what_the_score_with_it_says(is_changed
     steps = [StepColumns.of(one, own, np.array([at])) for one, own in zip(gained, by, strict=True)]
     changed = replace(given, sessions=(replace(gained[0], gain_changes=(at,)), gained[1]))
     for members in ((), (curve,)):
-        fall, _ = Evidence(given, SD).falls_beside(members, steps)
-        before, after = (Evidence(one, SD).score_beside(members) for one in (given, changed))
+        fall, _ = Evidence(given, SD).score_falls_with_steps(members, steps)
+        before, after = (Evidence(one, SD).comparable_score(members) for one in (given, changed))
         assert fall == pytest.approx(before - after, abs=2.0 + 0.05 * abs(fall))
         assert bool(fall > 20.0) is is_changed
 
@@ -401,8 +403,8 @@ def test_of_many_recordings_no_changes_are_asked_for(monkeypatch: pytest.MonkeyP
     """A column for each moment of each recording would be too many."""
     sessions = _sessions(*(_run(k, 0.0) for k in range(13)))
     state = _state(CURVED, sessions)
-    monkeypatch.setattr(Evidence, "falls_beside", lambda *given: pytest.fail("asked for"))
-    gained = _Gained.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions], SD)
+    monkeypatch.setattr(Evidence, "score_falls_with_steps", lambda *given: pytest.fail("asked for"))
+    gained = _OwnTerms.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions], SD)
     assert with_changes(state, gained) is gained
 
 
@@ -413,7 +415,7 @@ def _recorded(number: int, load: Array, reading_mbar: Array) -> Recording:
 
 def _is_told_to_jump(runs: list[Recording], factor: int = 4) -> bool:
     sessions = _sessions(*runs, factor=factor)
-    told = with_likelier_gains(_state(CURVED, sessions), sessions)
+    told = with_own_terms(_state(CURVED, sessions), sessions)
     return told is not None and any(one.zero_changes for one in told)
 
 

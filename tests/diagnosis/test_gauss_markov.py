@@ -11,7 +11,7 @@ from test_diagnosis_parts import RATE_HZ, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._gauss_markov import gauss_markov_of
-from smartshoe.diagnosis._jittered import as_sampled, jitter_s
+from smartshoe.diagnosis._jittered import jitter_s, with_sampling_jitter
 from smartshoe.diagnosis._residual_structure import residual_structure
 from smartshoe.diagnosis._session import Session
 
@@ -102,8 +102,8 @@ def test_a_mean_of_slow_noise_is_known_by_how_often_it_forgets(sessions, tau_s):
     keep = float(np.exp(-step_s / found.tau_s))
     slow = found.rms * np.sqrt(1.0 - keep**2) * lfilter([1.0], [1.0, -keep], rng.standard_normal(400_000))
     means = slow.reshape(-1, round(20.0 * tau_s / step_s)).mean(axis=1)
-    assert found.of_a_mean(20.0 * tau_s) == pytest.approx(float(means.std()), rel=0.1)
-    assert found.of_a_mean(0.01 * tau_s) == found.rms
+    assert found.sd_of_mean(20.0 * tau_s) == pytest.approx(float(means.std()), rel=0.1)
+    assert found.sd_of_mean(0.01 * tau_s) == found.rms
 
 
 def averaged(rng: np.random.Generator, size: int, step_s: float, length_s: float) -> np.ndarray:
@@ -175,7 +175,7 @@ def test_jitter_is_known_by_its_noise_and_smooths_as_it_does(seed, truth_s):
     t, load = clean.time_s, clean.force_n / 800.0
     reading = np.interp(t + truth_s * rng.standard_normal(t.size), t, load) + NOISE * rng.standard_normal(t.size)
     assert jitter_s(load, reading, 1 / RATE_HZ) == pytest.approx(truth_s, rel=0.2)
-    left = np.convolve(reading - as_sampled(load, reading, 1 / RATE_HZ, STANDARD), np.ones(25) / 25, "valid")
+    left = np.convolve(reading - with_sampling_jitter(load, reading, 1 / RATE_HZ, STANDARD), np.ones(25) / 25, "valid")
     unsmoothed = np.convolve(reading - load, np.ones(25) / 25, "valid")
     assert np.std(left) < 1.01 * np.std(unsmoothed)
 
@@ -183,7 +183,7 @@ def test_jitter_is_known_by_its_noise_and_smooths_as_it_does(seed, truth_s):
 def test_without_jitter_the_load_stays_as_it_is():
     one = recording(noise=NOISE)
     load, reading = one.force_n / 800.0, one.sensor.values / 140.0
-    assert as_sampled(load, reading, 1 / RATE_HZ, STANDARD) is load
+    assert with_sampling_jitter(load, reading, 1 / RATE_HZ, STANDARD) is load
 
 
 @pytest.mark.parametrize("louder", [1.25, 1.4])

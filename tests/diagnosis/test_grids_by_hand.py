@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
-from smartshoe.diagnosis._jittered import as_sampled, jitter_s
+from smartshoe.diagnosis._jittered import jitter_s, with_sampling_jitter
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
 from smartshoe.integrity.thresholds import largest_of_noise
@@ -134,9 +134,9 @@ def test_a_load_is_without_its_noise_and_level_at_rest_and_what_is_left_is_said(
     session = _prepared(_pressed(load, read), factor=factor)
     raw = noise_sd(load, STANDARD)
     quiet, left = without_noise(load, STEP_S, raw, STANDARD)
-    assert session.quiet.raw == pytest.approx(raw)
-    assert session.quiet.left == pytest.approx(left)
-    assert session.quiet.load == pytest.approx(quiet)
+    assert session.denoised.raw_sd == pytest.approx(raw)
+    assert session.denoised.remaining_sd == pytest.approx(left)
+    assert session.denoised.load == pytest.approx(quiet)
     weights = kernel(max(factor, 3))
     assert session.conditions.load_noise == pytest.approx(left * math.sqrt(float(np.sum(weights**2))))
     base = min(float(np.quantile(quiet, 0.02)), 0.02, float(quiet[0]))
@@ -159,7 +159,9 @@ def test_what_a_reading_follows_is_no_noise_of_its_load(late: int) -> None:
     # Of the reading's variance the noise is a share of (0.01/0.08)^2.
     assert followed_share(shaken, reading, STANDARD) == pytest.approx(1.0 / (1.0 + 0.125**2), abs=0.01)
     session = _prepared(_pressed(shaken, reading))
-    assert session.quiet.raw == pytest.approx(0.0125, rel=0.1)  # in shares of the load: what the reading's own hides
+    assert session.denoised.raw_sd == pytest.approx(
+        0.0125, rel=0.1
+    )  # in shares of the load: what the reading's own hides
     assert noise_sd(shaken, STANDARD) > 0.09
     for other, share in ((rng.standard_normal(4000), 0.0), (shaken + 0.3 * rng.standard_normal(4000), 0.0)):
         assert followed_share(shaken, other, STANDARD) == share  # none of it, or not nearly all
@@ -199,9 +201,9 @@ def test_a_load_is_smoothed_by_the_jitter_of_what_it_was_smoothed_to() -> None:
         sd = jitter_s(seen, reading, 0.02) / 0.02
         assert sd > 1.0
         seen = gaussian_filter1d(load, sd, mode="nearest")
-    assert as_sampled(load, reading, 0.02, STANDARD) == pytest.approx(seen)
+    assert with_sampling_jitter(load, reading, 0.02, STANDARD) == pytest.approx(seen)
     assert jitter_s(0.0 * load, reading, 0.02) == 0.0
     # What is later than any echo is no jitter, and what does not fit better is none either.
-    assert as_sampled(load, reading, 0.02, replace(STANDARD, echo_s=0.02)) is load
+    assert with_sampling_jitter(load, reading, 0.02, replace(STANDARD, echo_s=0.02)) is load
     # Whatever the gain between them.
     assert jitter_s(load, 7.0 * reading, 0.02) == pytest.approx(jitter_s(load, reading, 0.02))

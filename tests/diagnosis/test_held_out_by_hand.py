@@ -12,9 +12,9 @@ from scipy.stats import t as student
 from told_columns import MODEL, SCALE, STANDARD, past_columns, session_under, sessions_under, some_load
 
 from smartshoe.diagnosis._force import force_error
-from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
+from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, residual_of
 from smartshoe.diagnosis._sensitivity import (
-    where,
+    rows_where,
 )
 
 Array = NDArray[np.float64]
@@ -32,11 +32,11 @@ def test_an_offset_and_a_past_are_ridge_estimates_of_what_was_fitted(share: floa
         spread = np.std(residual[mask])
         wide = np.concatenate([past[mask], [[0.0, spread / holds]]])
         expected = np.linalg.lstsq(wide, np.append(residual[mask], 0.0), rcond=None)[0]
-        found, added = own_of(one, model, residual)
+        found, added = own_terms_of(one, model, residual)
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
         assert added == pytest.approx(past @ expected)
     lost = session_under(some_load(50, 3), np.zeros(50), lost=1.1)
-    assert own_of(lost, model, np.ones(50))[0] == pytest.approx([0.0, 0.0])
+    assert own_terms_of(lost, model, np.ones(50))[0] == pytest.approx([0.0, 0.0])
 
 
 def test_errors_are_sums_over_held_out_cycles_and_deviations_from_each_mean() -> None:
@@ -146,7 +146,7 @@ def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
         noise = 0.02 * np.random.default_rng(seed).standard_normal(size)
         one = session_under(load, 1.1 * load + 0.2 + noise, seed, held=np.arange(size) > 0.4 * size)
         held.append(one)
-        _, own = own_of(one, plain, one.reading - plain.simulate(one.conditions))
+        _, own = own_terms_of(one, plain, one.reading - plain.simulate(one.conditions))
         off = 800.0 * ((one.reading - own) / 1.1 - load)
         for which in squares:
             part = off[getattr(one, which)]
@@ -163,7 +163,7 @@ def test_rows_of_cycles_of_scattered_samples_and_of_none_are_those_of_the_mask()
     columns = np.asfortranarray(np.random.default_rng(3).standard_normal((600, 4)))
     masks = [np.arange(600) // 200 != 1, np.arange(600) % 3 > 0, np.zeros(600, dtype=bool), np.arange(600) == 7]
     for mask in masks:
-        found = where(mask, columns)
+        found = rows_where(mask, columns)
         np.testing.assert_array_equal(found, columns[mask])
         assert found.flags.f_contiguous
-    assert where(np.ones(600, dtype=bool), columns) is columns
+    assert rows_where(np.ones(600, dtype=bool), columns) is columns

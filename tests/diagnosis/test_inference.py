@@ -78,7 +78,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         precision = nuisance_precision(session, given.model)
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
         prior = np.full(rows.shape[1] - 1, limits.imperfection)
-        prior[: given.own] = 1.0
+        prior[: given.baseline_count] = 1.0
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
         kept = session.fitted
@@ -129,7 +129,7 @@ def test_likeness_is_the_cosine_of_what_the_baseline_cannot_follow(small: Linear
         past = np.zeros((rows.shape[0], 2 * len(small.sessions)))
         past[:, 2 * k : 2 * k + 2] = nuisances(session, small.model.pole_per_s)
         adds = [rows[:, small.candidates[m].columns] @ evidence.posterior((m,)).strengths[0] for m in alone]
-        followed.append(np.column_stack([rows[:, 1 : 1 + small.own], past])[session.fitted])
+        followed.append(np.column_stack([rows[:, 1 : 1 + small.baseline_count], past])[session.fitted])
         made.append(np.column_stack(adds)[session.fitted])
     z, y = np.concatenate(followed), np.concatenate(made)
     left = y - z @ np.linalg.lstsq(z, y, rcond=None)[0]

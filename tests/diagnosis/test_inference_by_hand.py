@@ -13,14 +13,14 @@ from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, t
 
 from smartshoe.diagnosis import _inference
 from smartshoe.diagnosis._inference import (
-    _best_alone,
+    _best_single,
     _is_likelier,
     _redundant,
     _screening,
     _Validated,
     _validated,
     _without_redundant,
-    independent,
+    independent_count,
     infer,
 )
 from smartshoe.models.effects import effect
@@ -33,13 +33,13 @@ MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 def test_what_can_be_left_out_is_a_recording_or_a_rise_of_a_single_one() -> None:
     rises = session_of(np.interp(np.arange(200), [0, 20, 40, 60, 80, 199], [0.0, 1.0, 0.2, 0.7, 0.1, 0.15]))
     none = session_of(WAVE, np.zeros(240, dtype=bool))
-    assert independent([rises, none], STANDARD) == 2
-    assert independent([rises, none, rises], STANDARD) == 2
-    assert independent([session_of(np.full(50, 0.3))], STANDARD) == 0
+    assert independent_count([rises, none], STANDARD) == 2
+    assert independent_count([rises, none, rises], STANDARD) == 2
+    assert independent_count([session_of(np.full(50, 0.3))], STANDARD) == 0
     # A rise is more than 0.08 of the span.
     for high, count in ((0.179, 1), (0.181, 2)):
         twice = np.interp(np.arange(200), [0, 50, 100, 150, 199], [0.0, 1.0, 0.1, high, 0.05])
-        assert independent([session_of(twice)], STANDARD) == count
+        assert independent_count([session_of(twice)], STANDARD) == count
 
 
 def test_screening_is_what_each_effect_alone_takes_off() -> None:
@@ -66,7 +66,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
         unlikely=(), changeable=[], names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={},
-        alone=None, weighed=[],
+        best_single=None, weighed=[],
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -81,7 +81,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     def settled(one: Any, progress: Any) -> Any:
         return state(f"settled {one.name}")
 
-    def better_from(begun: Any, one: Any, progress: Any) -> Any:
+    def simpler_from(begun: Any, one: Any, progress: Any) -> Any:
         return state(f"(settled {begun.name} or {one.name})")
 
     def named(name: str) -> Callable[..., Any]:
@@ -95,12 +95,12 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
             fit=SimpleNamespace(model=model, likelihood="likelihood"),
             evidence="evidence",
             refused=told.refused.get(one.name, ()),
-            undone=(),
-            is_stepped_down=one.name in told.stepped,
-            with_nothing_but=lambda plain: judged(one, plain, ()),
+            cancelling_names=(),
+            is_reduced=one.name in told.stepped,
+            reduced_to=lambda plain: judged(one, plain, ()),
         )
 
-    def likelier(found: Any, evidence: Any, members: Any) -> Any:
+    def likelier_changes(found: Any, evidence: Any, members: Any) -> Any:
         told.changeable.append([one.name for one in members])
         return iter([state(f"{change} {found.model}") for change in (told.changes.pop() if told.changes else ())])
 
@@ -110,33 +110,35 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
-    monkeypatch.setattr(_inference, "searched", lambda *given: (SimpleNamespace(noise_sd=0.1), SimpleNamespace()))
+    monkeypatch.setattr(
+        _inference, "linearised_search", lambda *given: (SimpleNamespace(noise_sd=0.1), SimpleNamespace())
+    )
     monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
-    monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
+    monkeypatch.setattr(_inference, "independent_count", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
-    monkeypatch.setattr(_inference, "weighed", lambda *given: plain)
-    monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
-    monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
+    monkeypatch.setattr(_inference, "evaluated", lambda *given: plain)
+    monkeypatch.setattr(_inference, "has_extreme_arm", lambda model: told.stretched)
+    monkeypatch.setattr(_inference, "has_arm_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "settled", settled)
-    monkeypatch.setattr(_inference, "better_from", better_from)
-    monkeypatch.setattr(_inference, "better_from_one", lambda begun, one, progress: one)
+    monkeypatch.setattr(_inference, "simpler_from", simpler_from)
+    monkeypatch.setattr(_inference, "simpler_from_single_effects", lambda begun, one, progress: one)
     monkeypatch.setattr(_inference, "simpler", lambda other, one: state(f"({other.name} or {one.name})"))
-    monkeypatch.setattr(_inference, "late_beside_usual_arm", named("late"))
+    monkeypatch.setattr(_inference, "latency_with_usual_arm", named("late"))
     monkeypatch.setattr(_inference, "state_at", lambda late: late)
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
-    monkeypatch.setattr(_inference, "with_an_arm_that_creeps", named("creeping"))
+    monkeypatch.setattr(_inference, "with_creeping_arm", named("creeping"))
     monkeypatch.setattr(_inference, "with_laws", lambda one, model: told.lawful or one)
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one: lawful if told.is_law else one)
-    monkeypatch.setattr(_inference, "with_likelier_gains", lambda state, sessions: None)
+    monkeypatch.setattr(_inference, "with_own_terms", lambda state, sessions: None)
     monkeypatch.setattr(_inference, "_validated", judged)
     monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
-    monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
-    monkeypatch.setattr(_inference, "_nearest", lambda *given: "nearest")
+    monkeypatch.setattr(_inference, "_best_single", lambda *given: told.best_single)
+    monkeypatch.setattr(_inference, "_nearest_single_law", lambda *given: "nearest")
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
-    monkeypatch.setattr(_inference, "likelier", likelier)
+    monkeypatch.setattr(_inference, "likelier_changes", likelier_changes)
     monkeypatch.setattr(_inference, "_is_likelier", lambda other, found: other.fit.model not in told.unlikely)
     told.state, told.plain = state, plain
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
@@ -149,7 +151,7 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
         assert (found.screening, found.likeness) == ("screening", "likeness")
-        assert found.nearest is None  # nothing may be named, whatever fits
+        assert found.nearest_law is None  # nothing may be named, whatever fits
         assert found.baseline is found.fit
 
 
@@ -242,7 +244,7 @@ def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(mon
     assert members == sets["without clock_drift"]
     assert (found.fit.model, found.best) == ("without clock_drift", "best of without clock_drift")
     assert (found.evidence.of, found.evidence.before) == ("without clock_drift", "whole")
-    assert (found.refused, found.undone, found.is_stepped_down) == (("refused",), ("undone",), True)
+    assert (found.refused, found.cancelling_names, found.is_reduced) == (("refused",), ("undone",), True)
     sets["without clock_drift"] = (_sized("delay", 0.01), _sized("sensor_lag", 0.9 * size))
     sets["without sensor_lag"] = (_sized("delay", 0.01),)
     found, members = without()
@@ -258,22 +260,22 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
     asked: list[Any] = []
     gains: Any = {"shared": "own", "own": "changing", "changing": None}
 
-    def likelier(state: Any, sessions: Any) -> Any:
+    def likelier_changes(state: Any, sessions: Any) -> Any:
         asked.append(sessions)
         return gains[sessions]
 
-    monkeypatch.setattr(_inference, "with_likelier_gains", likelier)
+    monkeypatch.setattr(_inference, "with_own_terms", likelier_changes)
     monkeypatch.setattr(_inference, "gains_of", lambda sessions, model, thresholds: (sessions, model))
     monkeypatch.setattr(_inference, "zero_changes_of", lambda sessions, model: ())
     flow.members = (_Sure(0.9),)
-    stands = [True, True, True]  # of each that is told, from the innermost on
-    monkeypatch.setattr(_inference, "foretells", lambda *given: stands.pop())
+    is_validated = [True, True, True]  # of each that is told, from the innermost on
+    monkeypatch.setattr(_inference, "predicts_better", lambda *given: is_validated.pop())
     found = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
     assert found.own_gains == ("changing", "settled first")  # those that were told at last
     assert asked == ["shared", "own", "changing"]
     assert "going through it again beside what recordings have of their own" in flow.said
     assert (found.fit.model, found.members) == ("settled first", (0.9,))
-    stands = [False, True]
+    is_validated = [False, True]
     other = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
     assert (other.fit, other.members, other.own_gains) == (other.baseline, (), found.own_gains)
     gains["shared"] = None
@@ -309,21 +311,21 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     """And it is the answer where nothing else is left."""
     least = STANDARD.least_confidence
     flow.members, flow.refused = (_Sure(0.1), _Sure(0.99 * least)), {"settled first": ("b", "curve")}
-    assert flow.infer().alone is None
+    assert flow.infer().best_single is None
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
         fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))),
-        undone=(), members=lambda: ("curve",),
+        cancelling_names=(), members=lambda: ("curve",),
     )  # fmt: skip
-    flow.alone = "a curve", judged
+    flow.best_single = "a curve", judged
     found = flow.infer()
-    assert (found.alone, found.fit, found.members) == ("a curve", judged.fit, ("curve",))
+    assert (found.best_single, found.fit, found.members) == ("a curve", judged.fit, ("curve",))
     assert found.refused == ("b",)
     flow.parts = {"settled first": (part, part)}
     found = flow.infer()
-    assert (found.alone, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
+    assert (found.best_single, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
     flow.members = (_Sure(0.1), _Sure(least))
-    assert flow.infer().alone is None
+    assert flow.infer().best_single is None
 
 
 def test_of_two_sets_that_is_likelier_which_has_more_evidence_about_its_own_fit(
@@ -336,7 +338,7 @@ def test_of_two_sets_that_is_likelier_which_has_more_evidence_about_its_own_fit(
         return None, SimpleNamespace(score=scores[model])
 
     monkeypatch.setattr(_inference, "evidence_about", about)
-    monkeypatch.setattr(_inference, "is_stretched", lambda model: model in stretched)
+    monkeypatch.setattr(_inference, "has_extreme_arm", lambda model: model in stretched)
 
     def judged(name: str, evidence: str = "of other") -> Any:
         return SimpleNamespace(fit=SimpleNamespace(model=name), evidence=evidence)
@@ -354,12 +356,12 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     stepped, left_out = set[str](), {"n0": 3.0, "n1": 1.0, "n2": 2.0, "n3": 0.5, "n4": 2.5, "n5": 0.1, "n6": 0.1}
     errors = {"plain": 0.01, **dict.fromkeys(left_out, 0.009)}
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: errors[model])
-    monkeypatch.setattr(_inference, "fit_of", lambda state, best, _: SimpleNamespace(model=f"n{best.members[0]}"))
+    monkeypatch.setattr(_inference, "fit_of_set", lambda state, best, _: SimpleNamespace(model=f"n{best.members[0]}"))
     monkeypatch.setattr(_inference, "State", lambda evidence, best, fit: fit)
     monkeypatch.setattr(
         _inference,
         "_validated",
-        lambda one, plain, sessions: SimpleNamespace(fit=one, is_stepped_down=one.model in stepped),
+        lambda one, plain, sessions: SimpleNamespace(fit=one, is_reduced=one.model in stepped),
     )
 
     class Left:
@@ -370,13 +372,14 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
 
     monkeypatch.setattr(_inference, "LeftOut", Left)
     begun: Any = SimpleNamespace(
-        given=evidence.given, evidence=evidence, start=(), thresholds=STANDARD, likelihood=lambda: None,
+        linearisation=evidence.linearisation, evidence=evidence, fitted_members=(),
+        thresholds=STANDARD, likelihood=lambda: None,
         fit=SimpleNamespace(model="plain"),
     )  # fmt: skip
     plain: Any = SimpleNamespace(model="plain")
 
     def found() -> str | None:
-        one = _best_alone(begun, plain, [])
+        one = _best_single(begun, plain, [])
         assert one is None or one[0].name == one[1].fit.model  # the effect that was added, and what it was judged to be
         return None if one is None else str(one[1].fit.model)
 
@@ -417,7 +420,7 @@ class _Judge:
         self.beyond: list[str] = []
         self.undone: list[list[str]] = []
         self.costs: dict[tuple[str, ...], float] = {}
-        self.stands = True
+        self.is_validated = True
         self.falls: list[tuple[str, ...]] = []
         self.left_out: dict[tuple[str, ...], float] = {}
         names = ("a", "b", "clock")
@@ -431,18 +434,18 @@ class _Judge:
         class Left:
             def __init__(self, *given: Any) -> None: ...
 
-            def following(self, found: Any) -> Any:
+            def consistent(self, found: Any) -> Any:
                 return SimpleNamespace(model=judge.model(*judge.follows), how="followed")
 
-            def stands(self, model: Any, plain: Any) -> bool:
-                return judge.stands and model.names not in judge.falls
+            def is_validated(self, model: Any, plain: Any) -> bool:
+                return judge.is_validated and model.names not in judge.falls
 
             def errors(self, model: Any) -> Any:
                 return np.array([judge.left_out.get(model.names, 1.0)])
 
         monkeypatch.setattr(_inference, "error_of", lambda sessions, model: self.errors.get(model.names, 0.5))
         monkeypatch.setattr(_inference, "LeftOut", Left)
-        monkeypatch.setattr(_inference, "fit_of", lambda *given: SimpleNamespace(model=self.model("a", "b")))
+        monkeypatch.setattr(_inference, "fit_of_set", lambda *given: SimpleNamespace(model=self.model("a", "b")))
         monkeypatch.setattr(
             _inference,
             "fit",
@@ -450,9 +453,11 @@ class _Judge:
                 model=model, how=steps, cost=self.costs.get(model.names, 0.0), likelihood=likelihood
             ),
         )
-        monkeypatch.setattr(_inference, "weighed", lambda *given: self.plain)
-        monkeypatch.setattr(_inference, "cancelling", lambda *given: self.undone.pop() if self.undone else [])
-        monkeypatch.setattr(_inference, "extrapolating", lambda *given: self.beyond.pop() if self.beyond else None)
+        monkeypatch.setattr(_inference, "evaluated", lambda *given: self.plain)
+        monkeypatch.setattr(_inference, "cancelling_effects", lambda *given: self.undone.pop() if self.undone else [])
+        monkeypatch.setattr(
+            _inference, "extrapolating_effect", lambda *given: self.beyond.pop() if self.beyond else None
+        )
         self.weighed_about: list[Any] = []
         monkeypatch.setattr(_inference, "evidence_about", self.about)
         monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
@@ -469,7 +474,7 @@ class _Judge:
     def inference(self) -> Any:
         best = self.evidence.posterior((0, 1))
         state: Any = SimpleNamespace(
-            given=self.evidence.given, evidence=self.evidence, best=best, thresholds=STANDARD,
+            linearisation=self.evidence.linearisation, evidence=self.evidence, best=best, thresholds=STANDARD,
             fit=SimpleNamespace(model=self.start), likelihood=lambda: "likelihood",
         )  # fmt: skip
         return _validated(state, self.plain, [])
@@ -499,7 +504,7 @@ def test_effects_are_weighed_about_the_model_that_is_told(monkeypatch: pytest.Mo
     judge.follows = ("b",)
     judge.judged()
     assert judge.weighed_about == [("b",)]
-    judge.stands = False
+    judge.is_validated = False
     judge.judged()
     assert judge.weighed_about == [("b",)]
 
@@ -521,14 +526,14 @@ def test_effects_that_others_undo_without_the_idle_one_stay_and_are_told(monkeyp
     judge = _Judge(monkeypatch)
     judge.undone = [["b"], ["a", "b"]]  # without the idle one, at first
     found = judge.inference()
-    assert (found.fit.model.names, found.refused, found.undone) == (("a", "b"), (), ("a", "b"))
+    assert (found.fit.model.names, found.refused, found.cancelling_names) == (("a", "b"), (), ("a", "b"))
     judge.undone, judge.follows = [["b"], ["a", "b"]], ("b",)  # what has gone for another reason is not told
-    assert judge.inference().undone == ("b",)
+    assert judge.inference().cancelling_names == ("b",)
     judge.undone, judge.follows, judge.errors[("b",)] = [["a", "b"]], ("a", "b"), 0.9  # each is needed
     found = judge.inference()
-    assert (found.fit.model.names, found.refused, found.undone) == (("a", "b"), (), ())
+    assert (found.fit.model.names, found.refused, found.cancelling_names) == (("a", "b"), (), ())
     judge.undone = []
-    assert judge.inference().undone == ()
+    assert judge.inference().cancelling_names == ()
 
 
 @pytest.mark.parametrize("error", [1.0, 1.5])
@@ -552,22 +557,22 @@ def test_of_a_set_that_does_not_stand_as_much_is_kept_as_does(monkeypatch: pytes
     judge.falls, judge.left_out = [("a", "b")], {("a",): 2.0, ("b",): 1.0}
     fit, members, refused = judge.judged()
     assert (fit.model.names, members, refused) == (("b",), (1,), ("a",))
-    assert judge.inference().is_stepped_down
-    found = judge.inference().with_nothing_but(judge.plain)
+    assert judge.inference().is_reduced
+    found = judge.inference().reduced_to(judge.plain)
     assert (found.fit, found.members(), found.refused) == (judge.plain, (), ("a", "b"))
     judge.falls.append(("b",))
     fit, members, refused = judge.judged()
     assert (fit, members, refused) == (judge.plain, (), ("a", "b"))
     judge.falls = []
-    assert not judge.inference().is_stepped_down
+    assert not judge.inference().is_reduced
 
 
 def test_what_went_astray_leaves_the_plain_model_and_what_that_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = _Judge(monkeypatch)
-    judge.stands = False
+    judge.is_validated = False
     assert judge.judged()[:2] == (judge.plain, ())
     judge.plain.model = judge.model("b")
     assert judge.judged()[:2] == (judge.plain, (1,))
-    judge.stands, judge.follows = True, ("b",)
+    judge.is_validated, judge.follows = True, ("b",)
     fit, members, _ = judge.judged()
     assert (fit, members) == (judge.plain, (1,))

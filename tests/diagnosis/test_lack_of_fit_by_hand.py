@@ -24,10 +24,10 @@ from smartshoe.diagnosis._lack_of_fit import (
     LackOfFit,
     _loudness,
     _mean_variance,
-    _quiet,
-    repeating,
+    _quiet_blocks,
+    repeating_structure,
     repeats,
-    slow,
+    slow_structure,
 )
 from smartshoe.diagnosis._residual_structure import beyond_noise, worst_place
 from smartshoe.models.effects import Conditions
@@ -163,12 +163,12 @@ def test_rows_of_cycles_that_come_back_are_those_of_written_out_sums() -> None:
 def test_the_power_of_what_repeats_and_its_score_are_those_of_written_out_sums(times: float) -> None:
     sessions, residuals = _runs()
     residuals = [times * one for one in residuals]
-    found = repeating(sessions, residuals, STANDARD)
+    found = repeating_structure(sessions, residuals, STANDARD)
     power, z, pairs = _slow_repeating(_slow_repeats(sessions, residuals))
     assert (found.rms, found.z, found.pairs) == (pytest.approx(math.sqrt(power)), pytest.approx(z), pairs)
     # What is each time the other way round does not repeat.
     signs = [np.where(one.cycle % 2, -1.0, 1.0) for one in sessions]
-    turned = repeating(sessions, [one * sign for one, sign in zip(residuals, signs, strict=True)], STANDARD)
+    turned = repeating_structure(sessions, [one * sign for one, sign in zip(residuals, signs, strict=True)], STANDARD)
     if turned.z < 0.0:
         assert turned.rms == 0.0
 
@@ -185,7 +185,7 @@ def test_what_swings_on_at_rest_repeats_as_what_swings_under_load() -> None:
     ((rows, share),) = repeats([_session(load, cycle)], [ringing + noise], ALIKE)
     assert share == pytest.approx(3 * (60 + 80) / 500)
     assert rows.shape == (3, PLACES + round(PLACES * 80 / 59))
-    found = repeating([_session(load, cycle)], [ringing + noise], STANDARD)
+    found = repeating_structure([_session(load, cycle)], [ringing + noise], STANDARD)
     assert found.significant
     assert found.rms == pytest.approx(np.sqrt(np.mean(ringing**2)), rel=0.1)
 
@@ -200,7 +200,7 @@ def test_loads_of_one_height_and_duration_that_go_by_other_courses_repeat_nothin
     assert [rows.shape[0] for rows, _ in found] == [2, 2]
     for rows, _ in found:
         assert rows[1] == pytest.approx(rows[0])
-    whole = repeating([_session(load, cycle)], [load], STANDARD)
+    whole = repeating_structure([_session(load, cycle)], [load], STANDARD)
     assert whole.pairs == 2
 
 
@@ -214,7 +214,7 @@ def test_of_many_repeats_the_sums_are_those_over_all_pairs_in_memory_for_one_eac
     auto = sum(np.correlate(row, row, "full")[PLACES - 1 :] for row in noise) / (PLACES * (count - 1))
     spread = (auto[0] ** 2 + 2.0 * np.sum((1.0 - np.arange(1, PLACES) / PLACES) * auto[1:] ** 2)) / PLACES
     tracemalloc.start()
-    found = repeating([_session(load, cycle)], [residual], STANDARD)
+    found = repeating_structure([_session(load, cycle)], [residual], STANDARD)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert found.rms == pytest.approx(math.sqrt(max(share * products.mean(), 0.0)), rel=1e-10)
@@ -228,13 +228,15 @@ def test_cycles_that_have_no_sample_are_passed_over() -> None:
     load, cycle = _pressed((40, 1.0), (40, 1.0))
     (told,), (spaced,) = (repeats([_session(load, by * cycle)], [load], ALIKE) for by in (1, 5))
     assert np.array_equal(told[0], spaced[0])
-    assert repeating([_session(np.linspace(0.0, 1.0, 4), np.arange(4) * 3)], [np.ones(4)], STANDARD).pairs == 0
+    assert (
+        repeating_structure([_session(np.linspace(0.0, 1.0, 4), np.arange(4) * 3)], [np.ones(4)], STANDARD).pairs == 0
+    )
 
 
 def test_a_single_pair_is_enough_to_repeat_and_not_to_be_significant() -> None:
     load, cycle = _pressed((40, 1.0), (40, 1.0))
     bow = load * (1.0 - load) + 1e-3 * np.random.default_rng(1).standard_normal(load.size)
-    found = repeating([_session(load, cycle)], [bow], STANDARD)
+    found = repeating_structure([_session(load, cycle)], [bow], STANDARD)
     assert (found.pairs, found.significant) == (1, False)
     assert found.z > 10.0
 
@@ -250,23 +252,23 @@ def test_a_score_is_significant_beyond_students_quantile(pairs: int) -> None:
 def test_structure_would_show_where_its_variance_is_beyond_students_quantile_of_noise(pairs: int) -> None:
     bound = float(student.isf(0.5 * STANDARD.false_alarm, pairs - 1))
     one = LackOfFit(0.0, 0.0, pairs, STANDARD, 1e-6)
-    assert not one.would_show(0.999e-3 * bound**0.5)
-    assert one.would_show(1.001e-3 * bound**0.5)
-    assert not replace(one, pairs=1).would_show(9.0)
-    assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_show(9.0)
+    assert not one.would_detect(0.999e-3 * bound**0.5)
+    assert one.would_detect(1.001e-3 * bound**0.5)
+    assert not replace(one, pairs=1).would_detect(9.0)
+    assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_detect(9.0)
 
 
 def test_what_a_test_would_show_is_what_it_finds_significant() -> None:
     load, cycle = _pressed(*[(40, 1.0)] * 6)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(load.size)
-    found = repeating([_session(load, cycle)], [noise], STANDARD)
+    found = repeating_structure([_session(load, cycle)], [noise], STANDARD)
     assert not found.significant
     assert found.z == pytest.approx((found.rms**2 or found.z * found.variance_sd) / found.variance_sd)
     least = np.sqrt(float(student.isf(0.5 * STANDARD.false_alarm, found.pairs - 1)) * found.variance_sd)
     bow = load * (1.0 - load)
     bow *= 1.5 * least / np.sqrt(np.mean(bow**2))
-    assert found.would_show(1.5 * least)
-    assert repeating([_session(load, cycle)], [noise + bow], STANDARD).significant
+    assert found.would_detect(1.5 * least)
+    assert repeating_structure([_session(load, cycle)], [noise + bow], STANDARD).significant
 
 
 @pytest.mark.parametrize(("count", "is_told"), [(9, False), (10, True)])
@@ -375,7 +377,7 @@ def test_blocks_are_judged_as_by_written_out_sums(step_s: float, keep: float) ->
         drift = 0.4 * np.sin(np.arange(size) / 30.0)
         sessions.append(_session(np.zeros(size), usable=usable, step_s=step_s))
         residuals.append(np.where(usable, loud * _noise(size, keep, seed) + drift, 1e4))
-    found, (mean, z, count) = slow(sessions, residuals, STANDARD), _slow_slow(sessions, residuals)
+    found, (mean, z, count) = slow_structure(sessions, residuals, STANDARD), _slow_slow(sessions, residuals)
     assert (found.z, found.pairs) == (pytest.approx(z, rel=1e-5), count)
     assert found.rms == pytest.approx(math.sqrt(max(mean, 0.0)), rel=1e-5)
 
@@ -383,18 +385,22 @@ def test_blocks_are_judged_as_by_written_out_sums(step_s: float, keep: float) ->
 def test_four_blocks_tell_nothing_and_five_do() -> None:
     noise = _noise(100, 0.3, 2)
     for size, blocks in ((99, 0), (100, 5)):
-        assert slow([_session(np.zeros(size), step_s=0.3)], [noise[:size]], STANDARD).pairs == blocks
+        assert slow_structure([_session(np.zeros(size), step_s=0.3)], [noise[:size]], STANDARD).pairs == blocks
     lost = np.ones(120, dtype=bool)
     lost[[3, 119]] = False
-    assert slow([_session(np.zeros(120), usable=lost, step_s=0.3)], [_noise(120, 0.3, 2)], STANDARD).pairs == 0
+    assert (
+        slow_structure([_session(np.zeros(120), usable=lost, step_s=0.3)], [_noise(120, 0.3, 2)], STANDARD).pairs == 0
+    )
     lost[119] = True
-    assert slow([_session(np.zeros(120), usable=lost, step_s=0.3)], [_noise(120, 0.3, 2)], STANDARD).pairs == 5
+    assert (
+        slow_structure([_session(np.zeros(120), usable=lost, step_s=0.3)], [_noise(120, 0.3, 2)], STANDARD).pairs == 5
+    )
 
 
 def test_the_quiet_are_the_nine_tenths_with_the_least_power_about_their_mean() -> None:
     rows = np.array([[0.0, size, 0.0, -size] for size in (3.0, 1.0, 9.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 1.5)])
     rows[1] += 100.0
-    assert list(np.flatnonzero(~_quiet(rows))) == [2]
+    assert list(np.flatnonzero(~_quiet_blocks(rows))) == [2]
 
 
 def test_how_loud_a_block_is_goes_by_its_neighbours_differences_but_one_jump() -> None:

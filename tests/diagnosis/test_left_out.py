@@ -15,7 +15,7 @@ from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import Session, prepare
-from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, cancelling, error_of
+from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, cancelling_effects, error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
@@ -105,9 +105,9 @@ def test_of_many_recordings_each_has_its_error_by_a_fit_without_its_group(monkey
 def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
     sessions = _sessions([_curved(0.1)] * 3)
     left_out, plain = _left_out(sessions), _fitted(sessions)
-    assert left_out.stands(_fitted(sessions, "gas_compression"), plain)
-    assert not left_out.stands(_fitted(sessions, "load_unload_asymmetry"), plain)
-    assert not left_out.stands(plain, plain)
+    assert left_out.is_validated(_fitted(sessions, "gas_compression"), plain)
+    assert not left_out.is_validated(_fitted(sessions, "load_unload_asymmetry"), plain)
+    assert not left_out.is_validated(plain, plain)
     # Two recordings that a drift of the gain happens to fit, each in its own way.
     rising, falling = (
         MODEL.with_part(effect("gain_drift"), np.array([slope, 0.0, 60.0, 0.0, 1.0])) for slope in (0.002, -0.0004)
@@ -115,8 +115,8 @@ def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
     chance = _sessions([rising, falling])
     model, bare = _fitted(chance, "gain_drift"), _fitted(chance)
     errors = [float(_left_out(chance).errors(one).sum()) for one in (model, bare)]
-    assert _left_out(chance).stands(model, bare) == (errors[0] < (1.0 - STANDARD.foreseen) * errors[1])
-    assert not _left_out(chance).stands(model, bare)
+    assert _left_out(chance).is_validated(model, bare) == (errors[0] < (1.0 - STANDARD.foreseen) * errors[1])
+    assert not _left_out(chance).is_validated(model, bare)
 
 
 def test_what_follows_as_a_law_does_needs_to_foresee_less(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,14 +132,14 @@ def test_what_follows_as_a_law_does_needs_to_foresee_less(monkeypatch: pytest.Mo
         monkeypatch.setattr(
             left_out, "errors", lambda one, way, left=1.0 - foreseen: np.array([1.0 if one is plain else left])
         )
-        assert (left_out.stands(law, plain), left_out.stands(half, plain)) == stand
+        assert (left_out.is_validated(law, plain), left_out.is_validated(half, plain)) == stand
     monkeypatch.setattr(left_out, "errors", lambda one, way: np.array([1.0 if one is plain else 1.0 - shares[1]]))
-    assert left_out.stands(half, plain)
+    assert left_out.is_validated(half, plain)
 
 
 def _following(sessions: list[Session], model: ExtendedModel, thresholds: Thresholds = STANDARD) -> tuple[str, ...]:
     found = fit(Likelihood(sessions, SD, MODEL, thresholds), model)
-    return _left_out(sessions, thresholds).following(found).model.names
+    return _left_out(sessions, thresholds).consistent(found).model.names
 
 
 def test_an_effect_that_is_not_there_is_taken_out_and_one_that_is_stays() -> None:
@@ -158,7 +158,7 @@ def test_an_effect_of_another_size_in_each_recording_must_gain_more_than_chance(
     gains = np.empty(4)
     for k, session in enumerate(changing):
         rest = Likelihood([one for one in changing if one is not session], SD, MODEL, STANDARD)
-        own = fit(rest, model, only="gas_compression").model
+        own = fit(rest, model, only_effect="gas_compression").model
         errors = [float(np.sum(residual_of(session, one) ** 2)) for one in (less, own)]
         gains[k] = errors[0] - errors[1]
     sure = float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(gains.size)))
@@ -178,7 +178,7 @@ def test_of_two_that_fail_that_one_goes_first_that_gains_least(monkeypatch: pyte
         return fit(likelihood, start, steps, *known, **beside)
 
     monkeypatch.setattr(_validation, "fit", kept)
-    assert impossible.following(fit(Likelihood(sessions, SD, MODEL, STANDARD), model)).model.names == ()
+    assert impossible.consistent(fit(Likelihood(sessions, SD, MODEL, STANDARD), model)).model.names == ()
     assert fitted == [("delay",), ("gas_compression",), ()]  # without each of them, then without the curve beside none
 
 
@@ -191,14 +191,14 @@ def test_effects_that_fit_by_their_difference_undo_one_another(reverse: float) -
     slow = np.array([-reverse * 0.009 * 300.0 / TIME_S[-1], 300.0, 1.0])  # a line with the other sign, nearly
     along = slow * np.array([-1.0, 1.0, 1.0])
     against = MODEL.with_part(drift, np.array([per_s, 0.0, 0.0, 1.0])).with_part(warm, slow)
-    assert cancelling(sessions, against, STANDARD) == ["zero_drift", "warm_up"]
+    assert cancelling_effects(sessions, against, STANDARD) == ["zero_drift", "warm_up"]
     together = MODEL.with_part(drift, np.array([per_s, 0.0, 0.0, 1.0])).with_part(warm, along)
-    assert cancelling(sessions, together, STANDARD) == []
+    assert cancelling_effects(sessions, together, STANDARD) == []
     # A small one beside them has no part in it.
     beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0, 3.0, 0.0, 1.0]))
-    assert cancelling(sessions, beside, STANDARD) == ["zero_drift", "warm_up"]
-    assert cancelling(sessions, MODEL, STANDARD) == []
-    assert cancelling(sessions, MODEL.with_part(warm, slow), STANDARD) == []
+    assert cancelling_effects(sessions, beside, STANDARD) == ["zero_drift", "warm_up"]
+    assert cancelling_effects(sessions, MODEL, STANDARD) == []
+    assert cancelling_effects(sessions, MODEL.with_part(warm, slow), STANDARD) == []
 
 
 def test_they_do_where_their_powers_are_clear_of_that_of_all_together() -> None:
@@ -215,5 +215,5 @@ def test_they_do_where_their_powers_are_clear_of_that_of_all_together() -> None:
     alone = (MODEL.with_part(drift, first), MODEL.with_part(warm, both.parts[1].values))
     ratio = sum(size(one) ** 2 for one in alone) / size(both) ** 2
     assert ratio > 1.5
-    assert cancelling(sessions, both, replace(STANDARD, clear=1.01 * ratio)) == []
-    assert cancelling(sessions, both, replace(STANDARD, clear=0.99 * ratio)) == ["zero_drift"]
+    assert cancelling_effects(sessions, both, replace(STANDARD, clear=1.01 * ratio)) == []
+    assert cancelling_effects(sessions, both, replace(STANDARD, clear=0.99 * ratio)) == ["zero_drift"]

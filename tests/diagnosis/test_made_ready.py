@@ -16,11 +16,11 @@ from test_diagnosis_parts import MODEL
 
 from smartshoe import Recording
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
-from smartshoe.diagnosis._diagnose import _without
+from smartshoe.diagnosis._diagnose import _limit_missing_predecessor
 from smartshoe.diagnosis._jittered import jitter_s
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
-from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
-from smartshoe.diagnosis._session import Session, at_full_rate, kernel, pastless, prepare, smoothed
+from smartshoe.diagnosis._sensitivity import available_effects, logged_channels, nuisance_precision
+from smartshoe.diagnosis._session import Session, at_full_rate, kernel, prepare, smoothed, without_predecessor
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.units import MILLIBAR
 
@@ -317,10 +317,10 @@ def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> Non
         time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * load, pressure_2_mbar=35.0 * load
     )
     alone, both = prepared(pressed(load))[0], prepared(beside)[0]
-    assert "cross_talk" not in {one.name for one in available(alone, STANDARD)}
-    assert "cross_talk" in {one.name for one in available(both, STANDARD)}
-    assert "cross_talk" not in {one.name for one in available([*alone, *both], STANDARD)}
-    found = available(alone, STANDARD)
+    assert "cross_talk" not in {one.name for one in available_effects(alone, STANDARD)}
+    assert "cross_talk" in {one.name for one in available_effects(both, STANDARD)}
+    assert "cross_talk" not in {one.name for one in available_effects([*alone, *both], STANDARD)}
+    found = available_effects(alone, STANDARD)
     assert all(one.is_physical and one.shifts is None and not one.is_refinement for one in found)
     assert {"delay", "linear_leak", "dead_band"} <= {one.name for one in found}
 
@@ -413,30 +413,30 @@ def test_of_recordings_that_continue_each_other_the_shortest_comes_first() -> No
 def test_a_recording_that_continues_one_that_is_not_given_says_so() -> None:
     load = triangles(6)
     first, second = replace(pressed(load), name="a"), replace(pressed(load), name="b", metadata={"continues": "a"})
-    assert (pastless([second, first]), pastless([second])) == ([], [second])
+    assert (without_predecessor([second, first]), without_predecessor([second])) == ([], [second])
     said = "b continues a, which is not among the recordings: it is taken as the unit's first after a rest"
-    assert any(one.startswith(said) for one in _without([second], 1, {}))
-    assert not _without([second, first], 2, {})
+    assert any(one.startswith(said) for one in _limit_missing_predecessor([second], 1, {}))
+    assert not _limit_missing_predecessor([second, first], 2, {})
     itself = replace(second, name="a")
-    assert pastless([itself]) == [itself]
+    assert without_predecessor([itself]) == [itself]
     why = "which is itself: it is taken as the unit's first after a rest (name the recording before it)"
-    assert _without([itself], 1, {}) == [f"a continues a, {why}"]
-    assert _without([replace(first, name="before"), itself], 2, {}) == [f"a continues a, {why}"]
+    assert _limit_missing_predecessor([itself], 1, {}) == [f"a continues a, {why}"]
+    assert _limit_missing_predecessor([replace(first, name="before"), itself], 2, {}) == [f"a continues a, {why}"]
     # Another recording of that name is one before it.
-    assert _without([first, itself], 2, {}) == []
+    assert _limit_missing_predecessor([first, itself], 2, {}) == []
 
 
 def test_a_load_cells_noise_is_taken_out_and_said() -> None:
     load = triangles(8, rest_s=4.0)
     noise = 2e-3 * np.random.default_rng(1).standard_normal(load.size)
     noisy, plain = prepared(pressed(load + noise, load))[0][0], prepared(pressed(load))[0][0]
-    assert noisy.quiet.raw == pytest.approx(2e-3, rel=0.1)
-    assert noisy.quiet.left < 0.6 * noisy.quiet.raw
+    assert noisy.denoised.raw_sd == pytest.approx(2e-3, rel=0.1)
+    assert noisy.denoised.remaining_sd < 0.6 * noisy.denoised.raw_sd
     off = noisy.conditions.load - plain.conditions.load
     loaded = plain.conditions.load > 0.1
-    assert np.std(off[loaded]) < 0.5 * noisy.quiet.raw
+    assert np.std(off[loaded]) < 0.5 * noisy.denoised.raw_sd
     assert np.std(off[plain.resting]) < 0.7 * np.std(off[loaded])
-    assert 0.0 < noisy.conditions.load_noise < noisy.quiet.left
+    assert 0.0 < noisy.conditions.load_noise < noisy.denoised.remaining_sd
 
 
 # -- noise of the load --------------------------------------------------------------------------------------------

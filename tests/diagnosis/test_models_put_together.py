@@ -22,7 +22,7 @@ def test_an_extension_that_is_worse_where_it_is_judged_is_not_adopted(
     parts.names = [name_of("linear_leak")]
     best = replace(BEFORE, squares=after**2 * BEFORE.squares)
     monkeypatch.setattr(_procedure, "errors", lambda _, model: best if model.parts else BEFORE)
-    monkeypatch.setattr(_procedure, "beyond", lambda *_: None)
+    monkeypatch.setattr(_procedure, "loads_beyond_fit", lambda *_: None)
     told = run_diagnosis(parts)
     assert [one.name for one in told.causes] == ["linear_leak"]
     assert told.gain.rmse_after == pytest.approx(after * told.gain.rmse_before)
@@ -35,7 +35,7 @@ def test_an_extension_that_is_worse_where_it_is_judged_is_not_adopted(
     assert any("; it is rejected" in said for said in told.limits) is is_rejected
     assert told.explained_percent == 0.0
     assert told.extended.structure_rms == pytest.approx(42.0 if is_rejected else 2.8)
-    assert parts.seen["not_explained_of"][0][0] is parts.kinds[0 if is_rejected else 1]  # of what is handed out
+    assert parts.seen["unexplained_remark"][0][0] is parts.kinds[0 if is_rejected else 1]  # of what is handed out
 
 
 def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what_was_fitted(
@@ -70,13 +70,13 @@ def test_a_calibration_takes_the_zero_of_what_its_filter_undoes(
     told = run_diagnosis(parts)
     assert told.force_model == ("with offset" if has_own else None)
     assert (parts.seen["_with_offset"][0][-1] is undone) == has_own
-    assert parts.seen["as_calibrated"][0][0].zero == zero
+    assert parts.seen["limit_calibration_off"][0][0].zero == zero
 
 
 def test_what_a_calibration_gives_of_the_same_recordings_is_said(parts: Any) -> None:
-    parts.as_calibrated = ["by one zero"]
+    parts.limit_calibration_off = ["by one zero"]
     assert run_diagnosis(parts).limits == ("limit", "by one zero")
-    (force, thresholds), _ = parts.seen["as_calibrated"]
+    (force, thresholds), _ = parts.seen["limit_calibration_off"]
     assert (force.fine, thresholds) == ([FINE], STANDARD)
     assert force.model.names == parts.found.fit.model.names
 
@@ -84,7 +84,7 @@ def test_what_a_calibration_gives_of_the_same_recordings_is_said(parts: Any) -> 
 def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
     parts.wall_ratio = "no such wall"
     assert run_diagnosis(parts).limits == ("limit", "no such wall")
-    (model, sessions, thresholds), _ = parts.seen["wall_ratio_of"]
+    (model, sessions, thresholds), _ = parts.seen["limit_wall_ratio"]
     assert (model.names, model.noise) == (parts.found.fit.model.names, parts.off)  # what is left of the reading
     assert ([one.name for one in sessions], thresholds) == (["held", "fitted"], STANDARD)
 
@@ -97,7 +97,7 @@ def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     assert told.limits == ("limit", "not undone", "no such wall")
     assert told.limits_of_the_force == ("not undone",)  # the wall is the model's
     parts.wall_ratio = None
-    (model, step_s), _ = parts.seen["not_undone_of"]
+    (model, step_s), _ = parts.seen["limit_not_undone"]
     assert model.names == parts.found.fit.model.names
     assert step_s == 0.05
     parts.seen.clear()
@@ -108,5 +108,5 @@ def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     (_, said, why) = run_diagnosis(parts).limits
     assert "gives a worse force: on what was fitted it is off by 8.2 N, the baseline by 8 N" in said
     assert why == "not undone"  # and so is why: what a stream cannot undo is left in its force
-    (model, _), _ = parts.seen["not_undone_of"]
+    (model, _), _ = parts.seen["limit_not_undone"]
     assert model.names == parts.found.fit.model.names

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
-from smartshoe.diagnosis._limits import bent_to_the_end_of
+from smartshoe.diagnosis._limits import limit_curve_range
 from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.diagnosis._naming import Name, confidence_of, names_of, probability_of_kind, probability_of_law
 from smartshoe.errors import UsageError
@@ -34,11 +34,11 @@ def member(
     of: str | Effect = "linear_leak",
     size: float = 0.01,
     fall: float = 1000.0,
-    departed: float = 0.1,
+    departure_sds: float = 0.1,
     laws: tuple[tuple[str, float], ...] = (),
 ) -> Member:
     one = effect(of) if isinstance(of, str) else of
-    return Member(one, size, departed, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
+    return Member(one, size, departure_sds, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
 
 
 def only(names: tuple[Name, ...]) -> Name:
@@ -106,11 +106,11 @@ def test_confidence_in_a_kind_grows_with_its_size_over_what_is_left(size: float,
 
 @given(st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 30.0), st.floats(0.0, 30.0))
 def test_confidence_falls_with_what_is_left_and_with_departure(
-    left: float, more: float, departed: float, further: float
+    left: float, more: float, departure_sds: float, further: float
 ) -> None:
-    sure = probability_of_kind(member(departed=departed), left, STANDARD)
-    assert probability_of_kind(member(departed=departed), left + more, STANDARD) <= sure
-    assert probability_of_kind(member(departed=departed + further), left, STANDARD) <= sure
+    sure = probability_of_kind(member(departure_sds=departure_sds), left, STANDARD)
+    assert probability_of_kind(member(departure_sds=departure_sds), left + more, STANDARD) <= sure
+    assert probability_of_kind(member(departure_sds=departure_sds + further), left, STANDARD) <= sure
 
 
 @given(st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
@@ -118,11 +118,11 @@ def test_confidence_falls_with_what_others_depart_by_and_with_likeness_to_them(
     departs: float, more: float, likeness: float, further: float
 ) -> None:
     """What is left and what others depart by are the same to it: what no equation follows."""
-    one = replace(member(), others_depart=departs, likeness=likeness)
+    one = replace(member(), others_departure_rms=departs, likeness=likeness)
     sure = probability_of_kind(one, 0.001, STANDARD)
-    assert probability_of_kind(replace(one, others_depart=departs + more), 0.001, STANDARD) <= sure
+    assert probability_of_kind(replace(one, others_departure_rms=departs + more), 0.001, STANDARD) <= sure
     assert probability_of_kind(replace(one, likeness=likeness + further), 0.001, STANDARD) <= sure
-    swapped = replace(one, others_depart=0.001)
+    swapped = replace(one, others_departure_rms=0.001)
     assert probability_of_kind(swapped, departs, STANDARD) == pytest.approx(sure)
 
 
@@ -151,13 +151,13 @@ def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_
         name = only(names_of([one], 0.0, STANDARD))
         assert name.kind_only is not is_law
         if is_law:
-            assert (name.effect.name, name.by, name.member) == (law, one.laws[0], one)
+            assert (name.effect.name, name.law_in_place, name.member) == (law, one.laws[0], one)
             assert name.kind_probability == probability_of_kind(one, 0.0, STANDARD)
             as_law = member(law, laws=rivals[:1] if of == "zero" else rivals, fall=1000.0 - margin)
             assert (name.law_probability, name.equivalents) == probability_of_law(as_law, STANDARD)
             assert name.equivalents == (("zero_drift",) if of == "zero" else ("saturation", "wall_hardening"))
         else:
-            assert name.by is None
+            assert name.law_in_place is None
 
 
 def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> None:
@@ -178,20 +178,20 @@ def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_
     (block, *_) = blocks()["static_curve"]
     laws = (("contact_area", 1.0), ("dead_band", 90.0))
     curve, other = (
-        member(block, size=0.01, departed=3.0, laws=laws),
-        member("play_hysteresis", size=0.012, departed=3.0),
+        member(block, size=0.01, departure_sds=3.0, laws=laws),
+        member("play_hysteresis", size=0.012, departure_sds=3.0),
     )
     left = 0.02
     assert names_of([curve, other], left, STANDARD) == ()
-    name = only(names_of([curve, other], left, STANDARD, alone=effect("saturation")))
+    name = only(names_of([curve, other], left, STANDARD, best_single=effect("saturation")))
     assert name.effect.name == "contact_area"
     assert name.kind_probability < 0.5
     assert not name.is_sure
-    assert names_of([curve, other], left, STANDARD, alone=effect("linear_leak")) == ()
+    assert names_of([curve, other], left, STANDARD, best_single=effect("linear_leak")) == ()
     small = replace(curve, size=STANDARD.tolerable)
-    assert names_of([small, other], left, STANDARD, alone=effect("contact_area")) == ()
-    ruled_out = replace(curve, departed=30.0)  # whose odds are those of no equivalent
-    assert names_of([ruled_out, other], left, STANDARD, alone=effect("saturation")) == ()
+    assert names_of([small, other], left, STANDARD, best_single=effect("contact_area")) == ()
+    ruled_out = replace(curve, departure_sds=30.0)  # whose odds are those of no equivalent
+    assert names_of([ruled_out, other], left, STANDARD, best_single=effect("saturation")) == ()
 
 
 def test_a_block_beside_the_law_that_is_its_nearest_is_that_laws_departure_and_no_second_name() -> None:
@@ -206,17 +206,17 @@ def test_a_block_beside_the_law_that_is_its_nearest_is_that_laws_departure_and_n
 def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_well() -> None:
     """A dead band of a third of full scale is a curve like any other; one of its own kind is a dead band."""
     laws = (("sensor_nonlinearity", 20.0), ("gas_compression", 60.0))
-    one = replace(member("dead_band", size=0.02, laws=laws, fall=1000.0), is_ended=True)
+    one = replace(member("dead_band", size=0.02, laws=laws, fall=1000.0), is_at_end_of_kind=True)
     name = only(names_of([one], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == ("sensor_nonlinearity", ("gas_compression",), False)
-    assert name.by is one.laws[0]
-    of_its_kind = replace(one, is_ended=False, laws=())
+    assert name.law_in_place is one.laws[0]
+    of_its_kind = replace(one, is_at_end_of_kind=False, laws=())
     name = only(names_of([of_its_kind], 0.0, STANDARD))
-    assert (name.effect.name, name.by) == ("dead_band", None)
+    assert (name.effect.name, name.law_in_place) == ("dead_band", None)
     # Where none follows as well the nearest gives its name to any curve.
     farther = tuple(Alternative(law.effect, law.margin + 1000.0 * STANDARD.departure**2) for law in one.laws)
     name = only(names_of([replace(one, laws=farther)], 0.0, STANDARD))
-    assert (name.effect.name, name.kind_only, name.by) == ("sensor_nonlinearity", True, None)
+    assert (name.effect.name, name.kind_only, name.law_in_place) == ("sensor_nonlinearity", True, None)
     assert {"gas_compression", "saturation", "contact_area", "wall_hardening"} <= {*name.equivalents}
 
 
@@ -226,8 +226,8 @@ def test_where_only_the_kind_is_known_the_name_is_half_sure_at_most_however_sure
     (block, *_) = blocks()[of]
     margins = (("dead_band", 500.0), ("contact_area", 510.0)) if of == "static_curve" else ()
     sure = []
-    for departed in (0.3, 1.5, 2.9, 4.0):
-        one = member(block, size=0.06, departed=departed, laws=margins)
+    for departure_sds in (0.3, 1.5, 2.9, 4.0):
+        one = member(block, size=0.06, departure_sds=departure_sds, laws=margins)
         name = only(names_of([one], 0.03, STANDARD))
         assert name.kind_only
         kind = probability_of_kind(one, 0.03, STANDARD)
@@ -250,10 +250,10 @@ def test_a_law_of_another_kind_that_nothing_tells_from_it_is_equivalent_where_it
 ) -> None:
     drift, most = member(of, laws=()), STANDARD.departure**4 * 1000.0
     for margin, equivalents in ((most, ("cycle_conditioning",)), (1.01 * most, ())):
-        told = replace(drift, untold=(Alternative("cycle_conditioning", margin),))
+        told = replace(drift, confounded=(Alternative("cycle_conditioning", margin),))
         name = only(names_of([told], 0.0, STANDARD))
         assert (name.effect.name, name.equivalents) == ("gain_drift", equivalents)
-    near = replace(drift, untold=(Alternative("cycle_conditioning", 0.0),))
+    near = replace(drift, confounded=(Alternative("cycle_conditioning", 0.0),))
     assert only(names_of([near], 0.0, STANDARD)).law_probability == pytest.approx(0.5)
     both = [near, member("cycle_conditioning")]  # what is there itself stands for no other
     assert [one.equivalents for one in names_of(both, 0.0, STANDARD)] == [(), ()]
@@ -288,29 +288,33 @@ def test_a_curve_at_the_end_of_its_range_bends_too_little(name: str, values: dic
     given = [values.get(parameter.name, value) for parameter, value in zip(one.parameters, one.start(), strict=True)]
     model = MODEL.with_part(one, given)
     assert model.part(name).bends_too_little is ends
-    said = bent_to_the_end_of(model)
+    said = limit_curve_range(model)
     assert (said is not None) is ends
     if said is not None:
         assert said.startswith(f"{in_words(name)} has come to the end of its range")
     # The same of a law that a free form in the model is named by.
     block = member("flexible_curve")
-    told = Name(block, one, 0.9, 0.9, (), by=Alternative(name, 0.0, replace(block.without, model=model)))
-    followed = bent_to_the_end_of(MODEL.with_part("flexible_gain_drift"), [told, replace(told, by=None)])
+    told = Name(block, one, 0.9, 0.9, (), law_in_place=Alternative(name, 0.0, replace(block.without, model=model)))
+    followed = limit_curve_range(MODEL.with_part("flexible_gain_drift"), [told, replace(told, law_in_place=None)])
     assert (followed is not None) is ends
     assert followed is None or "its parameters are bounds" in followed
 
 
 def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:
     """A leak or a drift may do what the other does, or a curve; a fast effect is none of these."""
-    fast, slow, doubted = member("play_hysteresis"), member("zero_drift"), member("linear_leak", departed=7.5)
+    fast, slow, capped_at_half = (
+        member("play_hysteresis"),
+        member("zero_drift"),
+        member("linear_leak", departure_sds=7.5),
+    )
     assert [one.member for one in names_of([fast, slow], 0.0, STANDARD)] == [fast, slow]
     beside = names_of([fast, slow], 0.0, STANDARD, is_clocked=True)
     assert [(one.member, one.is_sure) for one in beside] == [(fast, True), (slow, False)]
     assert beside[1].kind_probability == 0.5
-    told = names_of([slow, doubted], 0.0, STANDARD, is_clocked=True)
-    assert [(one.member, one.is_sure) for one in told] == [(slow, False), (doubted, False)]
+    told = names_of([slow, capped_at_half], 0.0, STANDARD, is_clocked=True)
+    assert [(one.member, one.is_sure) for one in told] == [(slow, False), (capped_at_half, False)]
     assert told[0].kind_probability == 0.5
-    assert told[1].kind_probability == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
+    assert told[1].kind_probability == probability_of_kind(capped_at_half, 0.0, STANDARD) < 0.5
 
 
 def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
@@ -318,19 +322,20 @@ def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> No
     assert only(names_of([sure], 0.0, STANDARD)).kind_probability > 0.5
     (told,) = names_of([sure], 0.0, STANDARD, is_unsteady=True)  # larger than what is left, and not to be ruled out
     assert (told.kind_probability, told.is_sure) == (0.5, False)
-    assert not names_of([member(size=0.05, departed=9.0)], 0.06, STANDARD, is_unsteady=True)
+    assert not names_of([member(size=0.05, departure_sds=9.0)], 0.06, STANDARD, is_unsteady=True)
 
 
 def test_where_none_is_sure_those_are_named_that_move_more_than_what_is_left_half_sure_at_most() -> None:
     likely, less, small = (
-        member(size=0.05, departed=2.5), member("rate_gain", size=0.04, departed=2.5), member(size=0.05, departed=4.8)
+        member(size=0.05, departure_sds=2.5), member("rate_gain", size=0.04, departure_sds=2.5),
+        member(size=0.05, departure_sds=4.8)
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     told = names_of([less, likely], 0.03, STANDARD)
     assert [(one.member, one.kind_probability, one.is_sure) for one in told] == [
         (less, 0.5, False), (likely, 0.5, False),
     ]  # fmt: skip
-    open_ = replace(likely, departed=3.5)
+    open_ = replace(likely, departure_sds=3.5)
     assert only(names_of([open_], 0.03, STANDARD)).kind_probability == probability_of_kind(open_, 0.03, STANDARD) < 0.5
     assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     assert only(names_of([small, less], 0.03, STANDARD)).member is less  # the largest can be ruled out
@@ -340,15 +345,15 @@ def test_where_none_is_sure_those_are_named_that_move_more_than_what_is_left_hal
 
 def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_cannot_be_ruled_out() -> None:
     sure = member("rate_gain", size=0.04)
-    likely, open_, less = (member(size=0.05, departed=by) for by in (2.5, 3.5, 4.8))
+    likely, open_, less = (member(size=0.05, departure_sds=by) for by in (2.5, 3.5, 4.8))
     out = STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     kinds = [probability_of_kind(one, 0.03, STANDARD) for one in (less, open_, likely)]
     assert kinds[0] < out < kinds[1] < 0.5 < kinds[2]
     # What cannot be ruled out is named where it is larger than what the other's law departs by.
     assert names_of([open_, sure], 0.03, STANDARD)[0].kind_probability == kinds[1]
     large = replace(sure, size=0.201)
-    assert only(names_of([replace(open_, others_depart=0.03), large], 0.0, STANDARD)).member is large
-    assert len(names_of([replace(open_, others_depart=0.03), replace(sure, size=0.199)], 0.0, STANDARD)) == 2
+    assert only(names_of([replace(open_, others_departure_rms=0.03), large], 0.0, STANDARD)).member is large
+    assert len(names_of([replace(open_, others_departure_rms=0.03), replace(sure, size=0.199)], 0.0, STANDARD)) == 2
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
     assert told[0].kind_probability == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
@@ -360,12 +365,12 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_cannot_be_
 
 def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> None:
     (block, *_) = blocks()["static_curve"]
-    curve = member(block, size=0.06, departed=1.5, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
-    likely = member(size=0.05, departed=2.5)
+    curve = member(block, size=0.06, departure_sds=1.5, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
+    likely = member(size=0.05, departure_sds=2.5)
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     named = only(names_of([curve, likely], 0.03, STANDARD))
     assert (named.is_sure, named.kind_only) == (True, True)
-    law = member("sensor_lag", size=0.06, departed=1.5)
+    law = member("sensor_lag", size=0.06, departure_sds=1.5)
     assert len(names_of([curve, law, likely], 0.03, STANDARD)) == 3
 
 

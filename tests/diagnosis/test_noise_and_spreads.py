@@ -15,7 +15,7 @@ from smartshoe.diagnosis._held_out import errors, gain
 from smartshoe.diagnosis._lack_of_fit import _mean_variance
 from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._validation import _spread
+from smartshoe.diagnosis._validation import _centred_rms
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
 
@@ -39,12 +39,12 @@ def test_the_variance_of_a_blocks_mean_follows_from_what_is_left_about_it(tau_s:
 def test_a_spread_goes_by_no_number_of_samples() -> None:
     one = np.random.default_rng(1).standard_normal(500)
     seen = np.ones(500, dtype=bool)
-    once, often = _spread([one], [seen]), _spread([np.tile(one, 4)], [np.ones(2000, dtype=bool)])
+    once, often = _centred_rms([one], [seen]), _centred_rms([np.tile(one, 4)], [np.ones(2000, dtype=bool)])
     assert once == pytest.approx(float(np.std(one)))
     assert often == pytest.approx(once)
     # About each one's own mean, and only where it is looked at.
-    assert _spread([one, one + 7.0], [seen, seen]) == pytest.approx(once)
-    assert _spread([one, 1e6 * one], [seen, ~seen]) == pytest.approx(once)
+    assert _centred_rms([one, one + 7.0], [seen, seen]) == pytest.approx(once)
+    assert _centred_rms([one, 1e6 * one], [seen, ~seen]) == pytest.approx(once)
 
 
 def test_where_nothing_is_held_out_no_number_is_said() -> None:

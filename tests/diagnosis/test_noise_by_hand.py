@@ -18,15 +18,15 @@ from smartshoe.diagnosis._gauss_markov import (
     GaussMarkov,
     _autoregression,
     _blocks,
+    _correlated_variance,
     _covariance,
     _kolmogorov,
     _lagged,
     _memory_s,
     _past_is_known,
-    _remembered,
     gauss_markov_of,
 )
-from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
 from smartshoe.models.effects import Conditions
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def _slow_twin(sessions: list[Any], residuals: list[Array]) -> dict[str, float]:
             covariance[k] += sum(level[i] * level[i + k] for i in range(level.size - k)) / total
     weights = _foretelling(covariance, total)
     order = weights.size
-    squares, loads, rates, coloured = [], [], [], 0.0
+    squares, loads, rates, spectrum_statistic = [], [], [], 0.0
     for level, there, load, rate in parts:
         new = np.zeros(level.size)
         for i in range(level.size):
@@ -88,7 +88,7 @@ def _slow_twin(sessions: list[Any], residuals: list[Array]) -> dict[str, float]:
         if new.size % 2:  # the highest is left out as an even length's Nyquist frequency is
             power = power[:-1]
         along = [float(np.sum(power[: k + 1]) / np.sum(power)) - (k + 1) / power.size for k in range(power.size)]
-        coloured = max(coloured, float(np.max(np.abs(along))) * math.sqrt(power.size))
+        spectrum_statistic = max(spectrum_statistic, float(np.max(np.abs(along))) * math.sqrt(power.size))
     # What remembers is what is foretold, or what neighbours share and lead back to a step, where that is no chance.
     shared = []
     for lag in (1, 2):
@@ -104,10 +104,10 @@ def _slow_twin(sessions: list[Any], residuals: list[Array]) -> dict[str, float]:
     level = np.concatenate([level[there] for level, there, _, _ in parts])
     return {
         "rms": rms,
-        "coloured": coloured,
-        "surprises": (float(np.mean(square**2)) - 3.0) / math.sqrt(24.0 / count),
-        "follows": max(abs(float(np.corrcoef(one, clipped)[0, 1])) for one in (loads, rates)) * math.sqrt(count),
-        "flatness": float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0,
+        "spectrum_statistic": spectrum_statistic,
+        "kurtosis_z": (float(np.mean(square**2)) - 3.0) / math.sqrt(24.0 / count),
+        "load_z": max(abs(float(np.corrcoef(one, clipped)[0, 1])) for one in (loads, rates)) * math.sqrt(count),
+        "excess_kurtosis": float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0,
     }
 
 
@@ -149,7 +149,7 @@ def test_a_recording_of_which_nothing_is_there_adds_nothing() -> None:
     # Where one of two recordings is followed without any error the other is looked at alone, but for their number.
     quiet = gauss_markov_of([one, _session(_loaded(400, 2))], [residual, np.zeros(400)], STANDARD)
     assert quiet is not None
-    assert quiet.coloured == pytest.approx(alone.coloured)
+    assert quiet.spectrum_statistic == pytest.approx(alone.spectrum_statistic)
 
 
 def test_in_fewer_blocks_nothing_is_told_of_noise() -> None:
@@ -166,7 +166,7 @@ def test_a_load_that_stands_still_is_followed_by_nothing() -> None:
     rng = np.random.default_rng(3)
     found = gauss_markov_of([_session(np.full(1200, 0.4))], [rng.standard_normal(1200)], STANDARD)
     assert found is not None
-    assert found.follows == 0.0
+    assert found.load_z == 0.0
 
 
 # -- its parts --------------------------------------------------------------------------------------------------------
@@ -175,7 +175,7 @@ def test_blocks_are_means_over_a_sensors_lag_about_the_mean_of_what_is_there() -
     kept = np.ones(22, dtype=bool)
     kept[9] = False
     found = _blocks(_session(load, kept), np.arange(22.0) ** 2, STANDARD)
-    assert list(found.there) == [True, True, False, True, True]
+    assert list(found.complete) == [True, True, False, True, True]
     means = np.array([np.mean(np.arange(4.0 * k, 4.0 * k + 4.0) ** 2) for k in range(5)])
     about = means[[0, 1, 3, 4]].mean()
     assert found.residual == pytest.approx([*(means[:2] - about), 0.0, *(means[3:] - about)])
@@ -216,7 +216,7 @@ def test_what_is_foretold_wholly_needs_no_more() -> None:
 
 def test_what_follows_a_gap_is_not_foretold() -> None:
     there = np.array([True, True, True, False, True, True, True, True])
-    blocks: Any = SimpleNamespace(there=there)
+    blocks: Any = SimpleNamespace(complete=there)
     assert list(_past_is_known(blocks, 0)) == list(there)
     assert list(_past_is_known(blocks, 2)) == [False, False, True, False, False, False, True, True]
 
@@ -237,12 +237,12 @@ def test_a_memory_that_lasts_beyond_what_is_looked_at_has_no_end() -> None:
 
 def test_the_part_that_remembers_is_what_its_fall_leads_back_to() -> None:
     """With white noise beside it: covariances 3, 1.6, 1.28 are those of 2 times 0.8 to the lag, and of 1 white."""
-    assert _remembered(3.0, 1.6, 1.28) == pytest.approx(2.0)
+    assert _correlated_variance(3.0, 1.6, 1.28) == pytest.approx(2.0)
     # No more than there is, no less than what a neighbour shares, and nothing where it shares none.
-    assert _remembered(1.8, 1.6, 1.28) == pytest.approx(1.8)
-    assert _remembered(3.0, 1.6, 1.9) == pytest.approx(1.6)
-    assert _remembered(3.0, 1.6, 0.0) == pytest.approx(1.6)
-    assert _remembered(3.0, 0.0, 0.5) == 0.0
+    assert _correlated_variance(1.8, 1.6, 1.28) == pytest.approx(1.8)
+    assert _correlated_variance(3.0, 1.6, 1.9) == pytest.approx(1.6)
+    assert _correlated_variance(3.0, 1.6, 0.0) == pytest.approx(1.6)
+    assert _correlated_variance(3.0, 0.0, 0.5) == 0.0
 
 
 def test_neighbours_agree_where_noise_alone_would_not() -> None:
@@ -278,21 +278,21 @@ def test_bounds_of_noise_are_those_of_a_false_alarm() -> None:
     assert pytest.approx(LARGEST) == DEVIATIONS
     below, above = 1.0 - 1e-9, 1.0 + 1e-9
     for field, bound in (
-        ("coloured", WHITE), ("tau_s", STANDARD.lasting_s), ("surprises", DEVIATIONS), ("surprises", -DEVIATIONS),
-        ("follows", DEVIATIONS),
+        ("spectrum_statistic", WHITE), ("tau_s", STANDARD.lasting_s), ("kurtosis_z", DEVIATIONS),
+        ("kurtosis_z", -DEVIATIONS), ("load_z", DEVIATIONS),
     ):  # fmt: skip
         told = [replace(QUIET, **{field: by * bound}).is_noise for by in (below, 1.0, above)]
         assert told == [True, False, False]
 
 
 def test_bounds_of_a_switch_are_those_of_a_false_alarm_and_of_two_clear_levels() -> None:
-    switching = replace(QUIET, surprises=50.0, flatness=-1.8, tau_s=100.0)
+    switching = replace(QUIET, kurtosis_z=50.0, excess_kurtosis=-1.8, tau_s=100.0)
     assert switching.switches
     for field, bound, then in (
-        ("coloured", WHITE, [True, False, False]),
-        ("follows", DEVIATIONS, [True, False, False]),
-        ("surprises", DEVIATIONS, [False, False, True]),
-        ("flatness", TWO_LEVELS, [False, False, True]),
+        ("spectrum_statistic", WHITE, [True, False, False]),
+        ("load_z", DEVIATIONS, [True, False, False]),
+        ("kurtosis_z", DEVIATIONS, [False, False, True]),
+        ("excess_kurtosis", TWO_LEVELS, [False, False, True]),
     ):
         told = [replace(switching, **{field: by * bound}).switches for by in (1.0 - 1e-9, 1.0, 1.0 + 1e-9)]
         assert told == then
@@ -317,17 +317,17 @@ def test_a_correlation_time_is_the_sum_of_covariances_up_to_the_first_that_is_no
     rng = np.random.default_rng(4)
     signals = [lfilter([1.0], [1.0, -0.8], rng.standard_normal(size)) for size in (150, 90, 40)]
     kept = [np.ones(150, dtype=bool), rng.random(90) < 0.8, np.zeros(40, dtype=bool)]
-    assert correlated_sd(signals, kept) == pytest.approx(_slow_sd(signals, kept), rel=1e-6)
+    assert effective_noise_sd(signals, kept) == pytest.approx(_slow_sd(signals, kept), rel=1e-6)
     # Neighbours that alternate tell no more than samples that are none of each other's.
     alternating = np.resize([1.0, -1.0], 100)
-    assert correlated_sd([alternating], [np.ones(100, dtype=bool)]) == pytest.approx(1.0)
-    nothing = correlated_sd([np.ones(20)], [np.ones(20, dtype=bool)])
-    assert nothing == FLOOR == correlated_sd([], []) == 1e-6
+    assert effective_noise_sd([alternating], [np.ones(100, dtype=bool)]) == pytest.approx(1.0)
+    nothing = effective_noise_sd([np.ones(20)], [np.ones(20, dtype=bool)])
+    assert nothing == FLOOR == effective_noise_sd([], []) == 1e-6
 
 
 @pytest.mark.parametrize("size", [3e-7, 1e-6, 1e-4])
 def test_no_noise_is_less_than_a_sensors(size: float) -> None:
     """Neighbours that alternate count once each, so that their standard deviation is their size."""
     alternating = size * np.resize([1.0, -1.0], 100)
-    found = correlated_sd([alternating], [np.ones(100, dtype=bool)])
+    found = effective_noise_sd([alternating], [np.ones(100, dtype=bool)])
     assert found == pytest.approx(max(size + 1e-9, 1e-6), rel=1e-9)

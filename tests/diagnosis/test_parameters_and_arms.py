@@ -90,10 +90,10 @@ def test_a_rate_that_an_effect_bent_is_found_anew_without_it() -> None:
 
 def test_a_shape_at_a_bound_is_stretched() -> None:
     law = effect("dead_band")
-    for softness, is_stretched in ((0.2, False), (0.03, True), (1.0, False), (3.0, True)):
-        assert _is_stretched(MODEL.with_part(law, np.array([0.05, softness, 0.1])), law) is is_stretched
-    for onset, is_stretched in ((0.0, False), (1.5, True)):  # that it sets in at once is no stretch
-        assert _is_stretched(MODEL.with_part(law, np.array([0.05, 0.2, onset])), law) is is_stretched
+    for softness, has_extreme_arm in ((0.2, False), (0.03, True), (1.0, False), (3.0, True)):
+        assert _is_stretched(MODEL.with_part(law, np.array([0.05, softness, 0.1])), law) is has_extreme_arm
+    for onset, has_extreme_arm in ((0.0, False), (1.5, True)):  # that it sets in at once is no stretch
+        assert _is_stretched(MODEL.with_part(law, np.array([0.05, 0.2, onset])), law) is has_extreme_arm
     # A strength at its bound is no shape, nor are another effect's.
     leak = effect("linear_leak")
     assert not _is_stretched(MODEL.with_part(leak, np.array([0.0])), leak)

@@ -52,9 +52,9 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
         )
         assert prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
     # Friction in each recording is no unit's; in one of them it is said.
-    rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
-    assert prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
-    mixed = prepared([runs[0], rubbed[1], runs[2]], 3, integrity(0.0), STANDARD)
+    lasting_memory = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
+    assert prepared(lasting_memory, 3, integrity(0.0), STANDARD).is_no_unit
+    mixed = prepared([runs[0], lasting_memory[1], runs[2]], 3, integrity(0.0), STANDARD)
     assert not mixed.is_no_unit
     assert sum("friction; Coulomb" in said for said in mixed.limits) == 1
     assert sum("friction; Coulomb" in said for said in prepared(runs, 3, integrity(0.0), STANDARD).limits) == 0

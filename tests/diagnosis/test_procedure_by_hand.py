@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
-from smartshoe.diagnosis._causes import _against, _held_out_evidence, cause_of, zero_cause_of
-from smartshoe.diagnosis._diagnose import _outside, _refused
+from smartshoe.diagnosis._causes import _held_out_evidence, _nearest_rival, cause_of, zero_cause_of
+from smartshoe.diagnosis._diagnose import _pulled_reason, _refused
 from smartshoe.diagnosis._excitation import Excitation
-from smartshoe.diagnosis._held_out import Errors, Gain, own_of
-from smartshoe.diagnosis._limits import refusals_of
+from smartshoe.diagnosis._held_out import Errors, Gain, own_terms_of
+from smartshoe.diagnosis._limits import limit_refusals
 from smartshoe.diagnosis._naming import confidence_of
 from smartshoe.diagnosis._procedure import (
     _goodness,
@@ -28,7 +28,7 @@ from smartshoe.diagnosis._procedure import (
 from smartshoe.diagnosis._result import Rival
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import prepare
-from smartshoe.diagnosis._verdict import names_in, not_explained_of, sentence_of, verdict_of
+from smartshoe.diagnosis._verdict import names_in, sentence_of, unexplained_remark, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, effect, shift_of
@@ -64,7 +64,7 @@ def test_a_load_of_both_signs_is_no_units(low: float, high: float, is_out: bool)
     load = np.repeat([low, high], 100)
     load[[0, 150]] = (-1e4, 1e4)
     one = Recording.from_arrays(time_s=0.1 * np.arange(200), force_n=load, pressure_mbar=load, name="pulled")
-    said = _outside(one, STANDARD)
+    said = _pulled_reason(one, STANDARD)
     assert (said is not None) is is_out
     if said is not None:
         assert f"pulled: the load runs from {low:.4g} to {high:.4g} N" in said
@@ -146,7 +146,7 @@ def _said(
     verdict: Any, *names: str, left: Any = None, elsewhere: float = 0.0, unproven: float = 0.0,
     baseline: Errors = BEFORE, best: Errors = AFTER, worse: bool = False, withheld: bool = False,
 ) -> str:  # fmt: skip
-    rest = not_explained_of(left or _left(0.034), elsewhere, unproven, STANDARD)
+    rest = unexplained_remark(left or _left(0.034), elsewhere, unproven, STANDARD)
     return sentence_of(verdict, _named(*names), baseline, best, rest, STANDARD, worse=worse, withheld=withheld)
 
 
@@ -165,21 +165,21 @@ def test_effects_without_a_name_are_counted_behind_the_causes() -> None:
 def test_what_is_not_explained_is_the_larger_of_what_is_left_and_what_is_off_elsewhere() -> None:
     for elsewhere in (0.0, 0.02, 0.034):
         for unproven in (0.0, 0.034):
-            said = not_explained_of(_left(0.034), elsewhere, unproven, STANDARD)
+            said = unexplained_remark(_left(0.034), elsewhere, unproven, STANDARD)
             assert said == "over all recordings 3.4 % repeats and is not explained"
     nothing = _left(0.5, significant=False)
     for left in (_left(0.034), nothing):
         for unproven in (0.0, 0.19):
-            said = not_explained_of(left, 0.19, unproven, STANDARD)
+            said = unexplained_remark(left, 0.19, unproven, STANDARD)
             assert said == "of held-out data 19 % is not explained"
         for elsewhere in (0.0, 0.19):
-            said = not_explained_of(left, elsewhere, 0.2, STANDARD)
+            said = unexplained_remark(left, elsewhere, 0.2, STANDARD)
             assert said == "20 % is left, of which nothing shows that it is noise"
-    slow = not_explained_of(_left(0.034, how="changes slowly"), 0.0, 0.0, STANDARD)
+    slow = unexplained_remark(_left(0.034, how="changes slowly"), 0.0, 0.0, STANDARD)
     assert slow == "over all recordings 3.4 % changes slowly and is not explained"
-    assert not_explained_of(_left(STANDARD.material), 0.0, 0.0, STANDARD) is None
-    assert not_explained_of(_left(1.001 * STANDARD.material), 0.0, 0.0, STANDARD) is not None
-    assert not_explained_of(nothing, 0.0, 0.0, STANDARD) is None
+    assert unexplained_remark(_left(STANDARD.material), 0.0, 0.0, STANDARD) is None
+    assert unexplained_remark(_left(1.001 * STANDARD.material), 0.0, 0.0, STANDARD) is not None
+    assert unexplained_remark(nothing, 0.0, 0.0, STANDARD) is None
 
 
 def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
@@ -225,22 +225,22 @@ def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged(
 
 
 def test_what_was_taken_out_again_is_said_once() -> None:
-    found: Any = SimpleNamespace(can_validate=True, refused=(), undone=())
-    assert refusals_of(found) == []
+    found: Any = SimpleNamespace(can_validate=True, refused=(), cancelling_names=())
+    assert limit_refusals(found) == []
     found.refused = ("linear_leak", "delay", "linear_leak")
-    (said,) = refusals_of(found)
+    (said,) = limit_refusals(found)
     assert said == (
         "tried and left out again: linear leak, delay: of no help in foreseeing recordings or load cycles that were"
         " left out in turn, or too small there for what the held-out loads ask of them"
     )
-    found.undone = ("rate_gain", "delay")
+    found.cancelling_names = ("rate_gain", "delay")
     undone = "these effects largely cancel one another, so that none is named: rate gain, delay"
-    assert refusals_of(found) == [undone, said]
-    found.undone, found.refused = (), ("flexible_lag", "linear_leak")
-    (said,) = refusals_of(found)
+    assert limit_refusals(found) == [undone, said]
+    found.cancelling_names, found.refused = (), ("flexible_lag", "linear_leak")
+    (said,) = limit_refusals(found)
     assert said.startswith("tried and left out again: lag of free form, linear leak: of no help")
     found.can_validate = False
-    (said,) = refusals_of(found)
+    (said,) = limit_refusals(found)
     assert "no cause can be told" in said
 
 
@@ -303,11 +303,11 @@ def _told(
         equivalents=equivalents,
         kind_only=kind_only,
         is_sure=is_sure,
-        by=by,
+        law_in_place=by,
     )
     excitation = Excitation((0.1,), (1.0,), present, STANDARD, channels=channels)
     whole = SimpleNamespace(model="the whole")
-    found: Any = SimpleNamespace(fit=whole, alone=alone)
+    found: Any = SimpleNamespace(fit=whole, best_single=alone)
     cause = cause_of(name, found, "fine", AFTER, SCALE, excitation, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without, held as the whole")]
     fitted = (whole, "static_curve_block") if by is None else (by.fit, "linear_leak")
@@ -433,10 +433,10 @@ def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelie
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", margin),))
     (rival,) = (one for one in cause.evidence if one.statistic == "margin to the nearest rival")
     assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, {said}")
-    assert _against(()) == []
-    (far,) = _against([Rival("delay", 278533.0, "evidence")])
+    assert _nearest_rival(()) == []
+    (far,) = _nearest_rival([Rival("delay", 278533.0, "evidence")])
     assert far.says == "delay, the nearest other, is less likely by 278,533 (-2 log likelihood)"
-    (likelier,) = _against([Rival("delay", -12.0, "evidence")])
+    (likelier,) = _nearest_rival([Rival("delay", -12.0, "evidence")])
     assert likelier.says == "delay, the nearest other, is likelier by 12 (-2 log likelihood)"
 
 
@@ -503,7 +503,7 @@ def test_a_trace_is_as_it_was_logged() -> None:
     assert found.reading == pytest.approx(3.0 - 140.0 * session.reading)
     for shown, model in ((found.baseline, other), (found.extended, MODEL)):
         plain = model.simulate(session.conditions)
-        own = own_of(session, model, session.reading - plain)[1]
+        own = own_terms_of(session, model, session.reading - plain)[1]
         assert shown == pytest.approx(3.0 - 140.0 * (plain + own))
     assert found.extended == pytest.approx(found.reading, abs=1.0)
     assert (found.usable is session.usable, found.held_out is session.held_out) == (True, True)

@@ -25,7 +25,7 @@ from smartshoe.diagnosis._excitation import (
     excitation_of,
 )
 from smartshoe.diagnosis._experiments import EXPERIMENTS
-from smartshoe.diagnosis._session import Quiet, Session
+from smartshoe.diagnosis._session import DenoisedLoad, Session
 from smartshoe.models.effects import Conditions, effect
 
 Array = NDArray[np.float64]
@@ -137,7 +137,16 @@ def _session(load: Array, step_s: float = 0.1, thinned: int = 3, resting: Any = 
     at = Conditions(step_s * np.arange(load.size), load, step_s)
     told: Any = SimpleNamespace(name="", metadata={})
     return Session(
-        told, 0, at, load, every, held, np.zeros(load.size, dtype=np.intp), at_rest, thinned, Quiet(load, 0.0, 0.0)
+        told,
+        0,
+        at,
+        load,
+        every,
+        held,
+        np.zeros(load.size, dtype=np.intp),
+        at_rest,
+        thinned,
+        DenoisedLoad(load, 0.0, 0.0),
     )
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._ranges import Ranges, _foreign, beyond, ranges_of
+from smartshoe.diagnosis._ranges import Ranges, _limit_foreign_gain, loads_beyond_fit, ranges_of
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import prepare
 from smartshoe.recording import Recording
@@ -125,11 +125,13 @@ def test_it_is_named_beside_the_first_that_tells_its_gain_also_where_it_only_jud
     assert said.startswith("run_2 reads 10 times what run_1 does")
     (said,) = _foreign_ones(_ranges(first, foreign, held_out=[False, True]))
     assert said.startswith("run_1 reads 10 times what run_0 does")
-    assert _foreign([("a", None), ("b", None)], Thresholds()) == []
-    assert _foreign([], Thresholds()) == []
-    (said,) = _foreign([("level", 0.0), ("a", 1.0), ("b", 10.0)], Thresholds())  # beside nothing none is many times
+    assert _limit_foreign_gain([("a", None), ("b", None)], Thresholds()) == []
+    assert _limit_foreign_gain([], Thresholds()) == []
+    (said,) = _limit_foreign_gain(
+        [("level", 0.0), ("a", 1.0), ("b", 10.0)], Thresholds()
+    )  # beside nothing none is many times
     assert said.startswith("b reads 10 times what a does")
-    assert _foreign([("a", 0.1), ("b", 1.0)], replace(Thresholds(), clear=4.0)) == []
+    assert _limit_foreign_gain([("a", 0.1), ("b", 1.0)], replace(Thresholds(), clear=4.0)) == []
 
 
 def _unlike_ones(found: Ranges) -> list[str]:
@@ -179,7 +181,9 @@ def test_loads_held_out_go_beyond_those_fitted_by_a_quarter(
     )
     usable = [np.ones(one.time_s.size, dtype=bool) for one in (fitted, held_out)]
     scale = full_scale([fitted], usable[:1], Thresholds())
-    told = beyond(prepare([fitted, held_out], usable, [False, True], scale, [1], Thresholds()), scale, Thresholds())
+    told = loads_beyond_fit(
+        prepare([fitted, held_out], usable, [False, True], scale, [1], Thresholds()), scale, Thresholds()
+    )
     assert told == (None if said is None else f"the held-out loads {said}")
 
 
@@ -194,7 +198,7 @@ def test_what_held_out_loads_do_that_fitted_ones_lack_is_said() -> None:
 
     def told(*recordings: Recording) -> str | None:
         sessions = prepare(recordings, usable, [False, True], scale, [1], Thresholds())
-        return beyond(sessions, scale, Thresholds())
+        return loads_beyond_fit(sessions, scale, Thresholds())
 
     assert str(told(pressed, resting)).endswith(
         "what was fitted lacks loads held for some seconds, at several levels, rests without load between loads"

@@ -17,22 +17,22 @@ from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._members import (
     Alternative,
+    _confounded_law,
     _other_laws,
     _shapes_beside,
-    _untold_law,
     alternatives,
-    begun_with,
     fit_with,
     members_of,
+    start_with,
 )
-from smartshoe.diagnosis._search import additions, allowed, search, step
+from smartshoe.diagnosis._search import best_additions, best_step, is_admissible, search
 from smartshoe.diagnosis._validation import (
     LeftOut,
     _in_standard_errors,
-    apart,
     error_of,
-    extrapolating,
+    extrapolating_effect,
     folds_of,
+    rms_difference,
     thirds_of,
 )
 from smartshoe.models.effects import effect
@@ -48,14 +48,14 @@ def test_members_far_larger_than_all_together_cancel() -> None:
     evidence: Any = ToldEvidence([candidate("a"), candidate("b")], worth(1.0, 1.0))
     found = evidence.posterior((0, 1))
     for together, is_allowed in ((2.5, True), (2.499, False)):
-        assert allowed(evidence, replace(found, sizes=(3.0, 4.0), together=together)) is is_allowed
+        assert is_admissible(evidence, replace(found, sizes=(3.0, 4.0), together=together)) is is_allowed
 
 
 def test_a_new_member_of_one_strength_has_its_sign() -> None:
     def told(inside: tuple[str, ...], strengths: Array) -> bool:
         evidence: Any = ToldEvidence([candidate("a"), candidate("b", sign=-1.0)], worth(1.0, 1.0), inside)
         evidence.strengths[1] = strengths
-        return allowed(evidence, evidence.posterior((0, 1)))
+        return is_admissible(evidence, evidence.posterior((0, 1)))
 
     assert told((), np.array([-1.0]))
     assert not told((), np.array([1.0]))
@@ -68,39 +68,39 @@ def test_additions_are_the_best_shape_of_each_effect_in_order() -> None:
     candidates = [candidate("a"), candidate("a"), candidate("b", "of b"), candidate("c", "of b"),
                   candidate("d", sign=-1.0), candidate("e")]  # fmt: skip
     evidence: Any = ToldEvidence(candidates, worth(1.0, 5.0, 3.0, 4.0, 9.0, 2.0))
-    assert additions(evidence, (), 10) == [1, 3, 2, 5]
-    assert additions(evidence, (), 2) == [1, 3]
-    assert additions(evidence, (2,), 10) == [1, 5]
-    assert additions(evidence, (), 10, ("a",)) == [3, 2, 5]
+    assert best_additions(evidence, (), 10) == [1, 3, 2, 5]
+    assert best_additions(evidence, (), 2) == [1, 3]
+    assert best_additions(evidence, (2,), 10) == [1, 5]
+    assert best_additions(evidence, (), 10, ("a",)) == [3, 2, 5]
     evidence.strengths[4] = np.ones(2)
-    assert additions(evidence, (), 1) == [4]
+    assert best_additions(evidence, (), 1) == [4]
     inside: Any = ToldEvidence(candidates, worth(1.0, 5.0, 3.0, 4.0, 9.0, 2.0), ("d",))
-    assert additions(inside, (), 1) == [4]
+    assert best_additions(inside, (), 1) == [4]
     first: Any = ToldEvidence([candidate("a"), candidate("a")], worth(5.0, 5.0))
-    assert additions(first, (), 5) == [0]
-    assert len(additions(ToldEvidence([candidate(f"n{k}") for k in range(9)], worth(*range(9))), ())) == 5  # type: ignore[arg-type]
+    assert best_additions(first, (), 5) == [0]
+    assert len(best_additions(ToldEvidence([candidate(f"n{k}") for k in range(9)], worth(*range(9))), ())) == 5  # type: ignore[arg-type]
 
 
 def test_a_step_adds_drops_or_swaps_for_the_better() -> None:
     candidates = [candidate(f"n{k}") for k in range(9)]
     added: Any = ToldEvidence(candidates, worth(1.0, 7.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert step(added, (0,)).members == (0, 1)
+    assert best_step(added, (0,)).members == (0, 1)
     dropped: Any = ToldEvidence(candidates, worth(*[-1.0] * 9))
-    assert step(dropped, (0, 1)).members in ((0,), (1,))
-    assert step(dropped, ()).members == ()
+    assert best_step(dropped, (0, 1)).members in ((0,), (1,))
+    assert best_step(dropped, ()).members == ()
     # Two that are worth nothing beside each other, each better than the first.
     table = {(0,): 90.0, (1,): 50.0, (2,): 60.0}
     swapped: Any = ToldEvidence(candidates[:3], lambda members: table.get(members, 100.0))
-    assert step(swapped, (0,)).members == (1,)
-    assert step(swapped, (0,), ("n1",)).members == (2,)
+    assert best_step(swapped, (0,)).members == (1,)
+    assert best_step(swapped, (0,), ("n1",)).members == (2,)
     # No more than seven; of eight one may go.
     full: Any = ToldEvidence(candidates, worth(*[1.0] * 9))
-    assert len(step(full, tuple(range(6))).members) == 7
-    assert len(step(full, tuple(range(7))).members) == 7
+    assert len(best_step(full, tuple(range(6))).members) == 7
+    assert len(best_step(full, tuple(range(7))).members) == 7
     # A set that is not allowed is none.
     wrong: Any = ToldEvidence([candidate("a", sign=-1.0), candidate("b")], worth(9.0, -3.0))
     wrong.strengths[0] = np.ones(1)
-    assert step(wrong, (1,)).members == ()
+    assert best_step(wrong, (1,)).members == ()
 
 
 @pytest.mark.parametrize(("barred", "members"), [(5, (0,)), (4, (0, 5))])
@@ -109,8 +109,8 @@ def test_five_are_tried_beside_a_set(monkeypatch: pytest.MonkeyPatch, barred: in
     candidates = [candidate(f"n{k}") for k in range(12)]
     beside: Any = ToldEvidence(candidates, worth(*(50.0 - k for k in range(12))))
     bad = set(range(1, 1 + barred))
-    monkeypatch.setattr(_search, "allowed", lambda evidence, found: not bad & set(found.members))
-    assert step(beside, (0,)).members == members
+    monkeypatch.setattr(_search, "is_admissible", lambda evidence, found: not bad & set(found.members))
+    assert best_step(beside, (0,)).members == members
 
 
 @pytest.mark.parametrize(("barred", "members"), [(3, (0,)), (2, (3,))])
@@ -119,8 +119,10 @@ def test_three_are_tried_in_each_members_place(
 ) -> None:
     alone = {(k,): 50.0 + k for k in range(1, 9)}
     evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(9)], lambda given: alone.get(given, 100.0))
-    monkeypatch.setattr(_search, "allowed", lambda evidence, found: not set(range(1, 1 + barred)) & set(found.members))
-    assert step(evidence, (0,)).members == members
+    monkeypatch.setattr(
+        _search, "is_admissible", lambda evidence, found: not set(range(1, 1 + barred)) & set(found.members)
+    )
+    assert best_step(evidence, (0,)).members == members
 
 
 def test_a_search_goes_on_while_it_gains() -> None:
@@ -147,8 +149,8 @@ def test_what_is_so_large_that_it_bends_is_taken_by_itself(monkeypatch: pytest.M
             seen.append((evidence, start, banned))
             return first
 
-        monkeypatch.setattr(_state, "step", stepped)
-        found = _state.searched(model, [], STANDARD, ("z",))
+        monkeypatch.setattr(_state, "best_step", stepped)
+        found = _state.linearised_search(model, [], STANDARD, ("z",))
         assert found == (("evidence", 0.5), first if answer == "first" else "all")
         assert seen == [(("evidence", 0.5), (0,), ("z",))]
     assert told == [((0, 1), ("z",))]
@@ -203,7 +205,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     one, two = effect("linear_leak"), effect("dead_band")
     candidates = [SimpleNamespace(name=e.name, effect=e, columns=(k,), slot=e.family) for k, e in enumerate((one, two))]
     evidence: Any = SimpleNamespace(
-        given=SimpleNamespace(candidates=candidates), thresholds=STANDARD, extensions=lambda members: []
+        linearisation=SimpleNamespace(candidates=candidates), thresholds=STANDARD, extensions=lambda members: []
     )
     sizes = {"linear_leak": 0.999 * STANDARD.material, "dead_band": 2.0 * STANDARD.material}
     costs = {(): 500.0, ("dead_band",): 130.0, ("linear_leak",): 170.0}
@@ -221,7 +223,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
         missing = [name for name in sizes if name not in found.model.names]
         return np.array([3.0, 7.0]) + sum((sizes[name] * ways[name] for name in missing), np.zeros(2))
 
-    monkeypatch.setattr(_members, "_left", left)
+    monkeypatch.setattr(_members, "_residuals", left)
     near = [Alternative(name, 1.0) for name in ("orifice_leak", "zero_drift", "delay", "contact_area")]
     monkeypatch.setattr(_members, "alternatives", lambda *given: (Alternative(None, float(given[2])), *near))
     monkeypatch.setattr(
@@ -230,23 +232,23 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     present = frozenset({"low_loads"})
     monkeypatch.setattr(_members, "excitation_of", lambda *given: SimpleNamespace(tells_apart=present))
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
-    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
+    monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: laws)
     likelihood: Any = SimpleNamespace(sessions=(), thresholds=STANDARD)
     extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0, likelihood=likelihood)
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
     found = members_of(evidence, best, extended)
-    assert [(m.name, m.departed, m.fall) for m in found] == [("dead_band", 0.7, 70.0), ("linear_leak", 0.3, 30.0)]
+    assert [(m.name, m.departure_sds, m.fall) for m in found] == [("dead_band", 0.7, 70.0), ("linear_leak", 0.3, 30.0)]
     assert [m.size for m in found] == pytest.approx([sizes["dead_band"], sizes["linear_leak"]])
     assert [m.likeness for m in found] == pytest.approx([math.sqrt(0.5)] * 2)
-    assert [m.others_depart for m in found] == pytest.approx(
+    assert [m.others_departure_rms for m in found] == pytest.approx(
         [0.25 * 0.3 * sizes["linear_leak"], 0.25 * 0.7 * sizes["dead_band"]]
     )
     assert [[one.margin for one in m.alternatives] for m in found] == [
         [1.0, 1.0, 1.0, 1.0, 1.0],
         [0.0, 1.0, 1.0, 1.0, 1.0],
     ]
-    assert (found[1].laws, found[1].untold) == ((), ())  # what is hardly there has no other law
-    assert found[0].untold == ()  # low loads tell a dead band from a curve, and nothing must tell it from a delay
+    assert (found[1].laws, found[1].confounded) == ((), ())  # what is hardly there has no other law
+    assert found[0].confounded == ()  # low loads tell a dead band from a curve, and nothing must tell it from a delay
     others = [law.name for law in laws if law.family == two.family and law.name != two.name]
     assert [law.effect for law in found[0].laws] == others
     assert set(asked) == {4}
@@ -256,10 +258,10 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     assert [(law.effect, law.margin) for law in leak.laws] == [("orifice_leak", 15.0)]
     assert leak.likeness == 0.0  # the other pulls against it
     # Of another kind, and told from it by what is not there; the free form of another branch is none of its kind.
-    assert [(law.effect, law.margin) for law in leak.untold] == [("zero_drift", 13.0)]
+    assert [(law.effect, law.margin) for law in leak.confounded] == [("zero_drift", 13.0)]
     assert 99 in asked  # fitted to its end, others a few steps
-    assert _untold_law(Alternative("gas_compression", 1.0), two, frozenset()) is None  # two curves
-    assert _untold_law(Alternative("zero_drift", 1.0), one, frozenset()) is effect("zero_drift")
+    assert _confounded_law(Alternative("gas_compression", 1.0), two, frozenset()) is None  # two curves
+    assert _confounded_law(Alternative("zero_drift", 1.0), one, frozenset()) is effect("zero_drift")
 
 
 def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
@@ -268,7 +270,7 @@ def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
     likelihood: Any = SimpleNamespace(
         cost=lambda model: float(np.sum(np.abs(model.parts[-1].values - wanted))), sessions=[]
     )
-    assert list(begun_with(law, MODEL, likelihood).parts[-1].values) == list(wanted)
+    assert list(start_with(law, MODEL, likelihood).parts[-1].values) == list(wanted)
 
 
 def test_a_law_is_fitted_from_all_its_shapes_small_and_large(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -310,7 +312,9 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
         asked.append(members)
         return [(score, k, np.ones(1)) for k, score in scores.items()]
 
-    evidence: Any = SimpleNamespace(given=SimpleNamespace(candidates=[*of_creep, *others]), extensions=extensions)
+    evidence: Any = SimpleNamespace(
+        linearisation=SimpleNamespace(candidates=[*of_creep, *others]), extensions=extensions
+    )
     found = _shapes_beside(Posterior((3, 4), 0.0, (), (), (0.3, 0.7)), 3, evidence)
     assert found == {law.name: [shapes[2], shapes[0], shapes[1]], "delay": [{}]}
     assert asked == [(4,)]
@@ -322,11 +326,11 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
         return SimpleNamespace(cost=110.0, model=model)
 
     monkeypatch.setattr(_members, "fit_with", fitted)
-    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
+    monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: [law])
     less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
     one: Any = SimpleNamespace(name="power_law_creep", effect=effect("power_law_creep"))
     extended: Any = SimpleNamespace(cost=100.0, model=MODEL.with_part("power_law_creep"))
-    (other,) = _other_laws(one, less, extended, found, is_ended=False)
+    (other,) = _other_laws(one, less, extended, found, is_at_end_of_kind=False)
     assert (other.effect, other.margin) == (law.name, 10.0)
     assert tried == [(law.name, [shapes[2], shapes[0]])]
 
@@ -340,19 +344,19 @@ def test_a_law_that_goes_on_to_an_arm_as_no_wall_has_is_weighed_beside_the_arm_t
     bent = replace(MODEL, relaxation_rate_per_s=0.02).with_part(law, values)
     fits: list[Any] = []
 
-    def refitted(likelihood: Any, model: Any, steps: Any = None, only: Any = None) -> Any:
-        fits.append((model, only))
-        end = replace(model, relaxing_share=9.0) if only is None and goes_on else model
-        return SimpleNamespace(cost=130.0 if only else 40.0, model=end)
+    def refitted(likelihood: Any, model: Any, steps: Any = None, only_effect: Any = None) -> Any:
+        fits.append((model, only_effect))
+        end = replace(model, relaxing_share=9.0) if only_effect is None and goes_on else model
+        return SimpleNamespace(cost=130.0 if only_effect else 40.0, model=end)
 
     monkeypatch.setattr(_members, "fit_with", lambda *_: SimpleNamespace(cost=50.0, model=bent))
-    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
+    monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: [law])
     monkeypatch.setattr(_members, "fit", refitted)
     kept = MODEL.with_part("gain_drift")
     less: Any = SimpleNamespace(model=kept, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
     extended: Any = SimpleNamespace(cost=100.0, model=kept.with_part("delay", np.array([0.02])))
     one: Any = SimpleNamespace(name="delay", effect=effect("delay"))
-    (other,) = _other_laws(one, less, extended, {}, is_ended=False)
+    (other,) = _other_laws(one, less, extended, {}, is_at_end_of_kind=False)
     if not goes_on:
         assert (other.margin, len(fits)) == (-50.0, 1)
         return
@@ -441,15 +445,15 @@ def test_an_extension_must_foresee_nearly_what_it_fitted(
         known: Any = SimpleNamespace(
             sessions=[], thresholds=STANDARD,
             errors=lambda model, way, by=by: np.array([3.0, 5.0]) * (1.0 - by * least if model == "it" else 1.0),
-            _ways=[None],
+            _schemes=[None],
         )  # fmt: skip
-        assert LeftOut.stands(known, "it", "plain") is stands  # type: ignore[arg-type]
+        assert LeftOut.is_validated(known, "it", "plain") is stands  # type: ignore[arg-type]
     either: Any = SimpleNamespace(
-        sessions=[], thresholds=STANDARD, _ways=[None, None],
+        sessions=[], thresholds=STANDARD, _schemes=[None, None],
         errors=lambda model, way: np.array([1.0 - 1.0001 * least if model == "it" and way == good else 1.0]),
     )  # fmt: skip
     for good in (0, 1, 2):  # where one recording is foreseen by the other, or a third of both by the rest
-        assert LeftOut.stands(either, "it", "plain") is (good < 2)  # type: ignore[arg-type]
+        assert LeftOut.is_validated(either, "it", "plain") is (good < 2)  # type: ignore[arg-type]
 
 
 def test_models_are_apart_and_off_by_the_rms_of_what_is_fitted() -> None:
@@ -458,7 +462,7 @@ def test_models_are_apart_and_off_by_the_rms_of_what_is_fitted() -> None:
     other = replace(MODEL, gain=1.2)
     for first, second in ((MODEL, other), (other, MODEL)):
         off = [(residual_of(s, first) - residual_of(s, second))[s.fitted] for s in sessions]
-        assert apart(sessions, first, second) == pytest.approx(math.sqrt(np.mean(np.concatenate(off) ** 2)))
+        assert rms_difference(sessions, first, second) == pytest.approx(math.sqrt(np.mean(np.concatenate(off) ** 2)))
     left = np.concatenate([residual_of(s, MODEL)[s.fitted] for s in sessions])
     assert error_of(sessions, MODEL) == pytest.approx(math.sqrt(np.mean(left**2)))
     assert error_of([], MODEL) == 0.0
@@ -482,5 +486,5 @@ def test_an_effect_beyond_ten_times_what_was_fitted_is_no_knowledge(ratio: float
         seen, unseen, every = np.ones(40, dtype=bool), np.zeros(40, dtype=bool), small * swing
         fitted = SimpleNamespace(conditions=every, fitted=seen, judged=unseen)
         held = SimpleNamespace(conditions=7.0 + ratio * within * swing, fitted=unseen, judged=seen)
-        found = extrapolating([fitted, held], extended(1.0), STANDARD)  # type: ignore[list-item]
+        found = extrapolating_effect([fitted, held], extended(1.0), STANDARD)  # type: ignore[list-item]
         assert found == ("b" if is_beyond and small < enough else None)

@@ -19,12 +19,12 @@ from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._prepared import prepared
-from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, lowest, thinning
+from smartshoe.diagnosis._scale import Scale, at_lowest_load, fitted_lengths, full_scale, thinning
 from smartshoe.diagnosis._session import (
     Session,
     _cycles,
-    _left_behind,
-    _rests_levelled,
+    _history_after,
+    _with_level_rests,
     at_full_rate,
     begins_unloaded,
     kernel,
@@ -81,9 +81,9 @@ def test_an_average_is_of_a_signal_turned_about_its_end_points(reach: int, facto
 # -- scales -----------------------------------------------------------------------------------------------------------
 def test_the_lowest_load_is_within_what_stands_still() -> None:
     load = np.concatenate([np.full(50, 100.0), np.full(50, 116.0), np.full(50, 116.1), np.full(50, 900.0)])
-    assert list(np.flatnonzero(lowest(load, STANDARD))) == list(range(100))  # 100 + 0.02 times 800
+    assert list(np.flatnonzero(at_lowest_load(load, STANDARD))) == list(range(100))  # 100 + 0.02 times 800
     spiked = np.concatenate([load, load, load, load, load, load, [-5000.0]])
-    assert np.count_nonzero(lowest(spiked, STANDARD)) == 601
+    assert np.count_nonzero(at_lowest_load(spiked, STANDARD)) == 601
 
 
 def test_full_scale_is_of_percentiles_and_its_sign_the_slopes() -> None:
@@ -244,7 +244,7 @@ def test_each_rest_is_levelled_but_for_what_is_beyond_the_noise() -> None:
     rng = np.random.default_rng(3)
     load = np.concatenate([0.01 * rng.standard_normal(12), np.full(5, 0.8), 0.02 + 0.01 * rng.standard_normal(20)])
     load[30] = -0.2
-    found = _rests_levelled(load, 0.1, 0.03)
+    found = _with_level_rests(load, 0.1, 0.03)
     first, last = load[:12], load[17:]
     near = np.abs(first - np.median(first)) < 0.03
     assert near.sum() > 10
@@ -255,8 +255,8 @@ def test_each_rest_is_levelled_but_for_what_is_beyond_the_noise() -> None:
     assert list(found[12:17]) == [0.8] * 5
     for count, is_levelled in ((10, False), (11, True)):
         few = np.concatenate([np.ones(3), np.resize([0.0, 0.01], count), np.ones(3)])
-        assert bool(np.ptp(_rests_levelled(few, 0.1, 0.5)[3:-3]) == 0.0) is is_levelled
-    assert list(_rests_levelled(np.array([0.1] * 20), 0.1, 0.5)) == [0.1] * 20
+        assert bool(np.ptp(_with_level_rests(few, 0.1, 0.5)[3:-3]) == 0.0) is is_levelled
+    assert list(_with_level_rests(np.array([0.1] * 20), 0.1, 0.5)) == [0.1] * 20
 
 
 def _conditions(load: Array, step_s: float = STEP_S, before: Any = None) -> Conditions:
@@ -298,17 +298,17 @@ def test_fewer_than_six_cycles_make_twelve_parts_of_the_time(rises: int, count: 
 def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
     load = course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
     dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in itertools.pairwise(load))
-    first = dict(_left_behind(_conditions(load), STANDARD).sums)
+    first = dict(_history_after(_conditions(load), STANDARD).sums)
     way = 0.5 * float(np.sum(np.abs(np.diff(load))))
     # A reversal shows in full but for twice the play's half width, which is no noise.
     assert first.pop("way") == pytest.approx(way, abs=4 * LEAST_DEAD_ZONE)
     assert first == pytest.approx({"largest_load": 0.9, "cycles": 2.0, "time_s": 90 * STEP_S, "dose": dose})
     before = {"largest_load": 0.95, "cycles": 7.0, "way": 3.0, "time_s": 30.0, "dose": 4.0}
-    later = dict(_left_behind(_conditions(load, before=before), STANDARD).sums)
+    later = dict(_history_after(_conditions(load, before=before), STANDARD).sums)
     assert later.pop("way") == pytest.approx(3.0 + way, abs=4 * LEAST_DEAD_ZONE)
     expected = {"largest_load": 0.95, "cycles": 9.0, "time_s": 30.0 + 90 * STEP_S, "dose": 4.0 + dose}
     assert later == pytest.approx(expected)
-    lower = _left_behind(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD).sums
+    lower = _history_after(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD).sums
     assert lower["largest_load"] == pytest.approx(0.9)
 
 
@@ -351,7 +351,7 @@ def test_at_the_full_rate_each_sample_is_of_the_nearest_thinned_one() -> None:
     nearest = [min((k + 2) // 4, sessions[0].cycle.size - 1) for k in range(PRESSES.size)]
     assert list(fine.cycle) == list(sessions[0].cycle[nearest])
     assert list(fine.held_out) == list(sessions[0].held_out[nearest])
-    assert fine.quiet is sessions[0].quiet
+    assert fine.denoised is sessions[0].denoised
     assert fine.conditions.step_s == pytest.approx(STEP_S)
 
 

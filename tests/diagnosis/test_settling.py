@@ -26,7 +26,7 @@ class _State:
 
     fitted: str
     found: str
-    improved: float
+    score_gain: float
     path: tuple[Any, ...] = ()
     score: float = 0.0
     noise_sd: float = 0.1
@@ -37,11 +37,11 @@ class _State:
     is_worth_a_fit = State.is_worth_a_fit
 
     @property
-    def given(self) -> _State:
+    def linearisation(self) -> _State:
         return self
 
     @property
-    def start(self) -> str:
+    def fitted_members(self) -> str:
         return self.fitted
 
     @property
@@ -63,7 +63,7 @@ class _State:
     @property
     def itself(self) -> tuple[str, str, float]:
         """What it is, however it was come to."""
-        return self.fitted, self.found, self.improved
+        return self.fitted, self.found, self.score_gain
 
 
 def _model(names: str) -> Any:
@@ -86,9 +86,9 @@ def _ends(
         fits.append(then[len(fits)].fit)
         return fits[-1]
 
-    monkeypatch.setattr(_settling, "_promising", lambda state: [None])
-    monkeypatch.setattr(_settling, "fit_of", fitted)
-    monkeypatch.setattr(_settling, "apart", lambda *given: apart)
+    monkeypatch.setattr(_settling, "_trial_sets", lambda state: [None])
+    monkeypatch.setattr(_settling, "fit_of_set", fitted)
+    monkeypatch.setattr(_settling, "rms_difference", lambda *given: apart)
     monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
     monkeypatch.setattr(_settling, "Evidence", weighed)
     return _settling.settled(first, lambda said: None, known), len(fits)  # type: ignore[arg-type]
@@ -108,11 +108,11 @@ def test_a_state_that_comes_back_ends_it(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (end.itself, fits) == (again.itself, 2)
 
 
-@pytest.mark.parametrize(("improved", "fits"), [(ODDS - 0.1, 0), (ODDS - 1e-9, 0), (ODDS + 1e-9, 0), (ODDS + 0.1, 1)])
+@pytest.mark.parametrize(("score_gain", "fits"), [(ODDS - 0.1, 0), (ODDS - 1e-9, 0), (ODDS + 1e-9, 0), (ODDS + 0.1, 1)])
 def test_nothing_is_fitted_for_less_than_the_odds_against_a_name(
-    monkeypatch: pytest.MonkeyPatch, improved: float, fits: int
+    monkeypatch: pytest.MonkeyPatch, score_gain: float, fits: int
 ) -> None:
-    assert _ends(monkeypatch, _State("", "a", improved), [_State("a", "a", 0.0)])[1] == fits
+    assert _ends(monkeypatch, _State("", "a", score_gain), [_State("a", "a", 0.0)])[1] == fits
 
 
 def test_it_ends_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,22 +155,23 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
     """Of the two likeliest alone the one that follows better; where fewer than two were found nothing is done."""
     worth_of = {"x": 20.0, "y": 5.0}
     begun: Any = SimpleNamespace(
-        start=(), given=None, fit=SimpleNamespace(model=SimpleNamespace(names=(), parts=(), relaxing_share=0.1)),
+        fitted_members=(), linearisation=None,
+        fit=SimpleNamespace(model=SimpleNamespace(names=(), parts=(), relaxing_share=0.1)),
         evidence=SimpleNamespace(posterior=lambda members: members[0]),
     )  # fmt: skip
     parts = tuple(SimpleNamespace(effect=effect("dead_band")) for _ in found)
     model = SimpleNamespace(names=tuple(found), parts=parts, relaxing_share=0.1)
     state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD)
     said: list[str] = []
-    monkeypatch.setattr(_settling, "additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
+    monkeypatch.setattr(_settling, "best_additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
     monkeypatch.setattr(
-        _settling, "fit_of",
+        _settling, "fit_of_set",
         lambda state, one, likelihood: SimpleNamespace(cost=worth_of[one], model=SimpleNamespace(names=(one,))),
     )  # fmt: skip
     monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: likely)
     monkeypatch.setattr(_settling, "state_at", lambda found: found.model.names)
-    monkeypatch.setattr(_settling, "better_from", lambda begun, state, progress: begun)
-    told = _settling.better_from_one(begun, state, said.append)
+    monkeypatch.setattr(_settling, "simpler_from", lambda begun, state, progress: begun)
+    told = _settling.simpler_from_single_effects(begun, state, said.append)
     assert told == (("y",) if one_is else state)
     assert said == (["beginning anew from y"] if one_is else [])
 
@@ -187,11 +188,11 @@ def test_a_lag_alone_is_tried_beside_a_usual_arm_where_anything_is_late_or_relax
     model = SimpleNamespace(parts=(SimpleNamespace(effect=effect(found)),), relaxing_share=0.1)
     state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None)
     late: Any = SimpleNamespace(cost=1.0, model=SimpleNamespace(names=("sensor_lag",)))
-    monkeypatch.setattr(_settling, "late_beside_usual_arm", lambda one: late)
+    monkeypatch.setattr(_settling, "latency_with_usual_arm", lambda one: late)
     monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: other is late)
     monkeypatch.setattr(_settling, "state_at", lambda one: one.model.names)
-    monkeypatch.setattr(_settling, "better_from", lambda begun, state, progress: begun)
-    told: Any = _settling.better_from_one(begun, state, lambda said: None)
+    monkeypatch.setattr(_settling, "simpler_from", lambda begun, state, progress: begun)
+    told: Any = _settling.simpler_from_single_effects(begun, state, lambda said: None)
     assert told == (("sensor_lag",) if is_tried else state)
 
 
@@ -213,11 +214,11 @@ def test_what_began_anew_is_weighed_once_and_its_way_remembered(monkeypatch: pyt
     for taken in (state, other):
         monkeypatch.setattr(_settling, "settled", lambda *given: other)
         monkeypatch.setattr(_settling, "simpler", lambda one, than, taken=taken: taken)
-        found: Any = _settling.better_from(begun, state, lambda said: None)  # type: ignore[arg-type]
+        found: Any = _settling.simpler_from(begun, state, lambda said: None)  # type: ignore[arg-type]
         assert (found.fitted, [one.names for one in found.path]) == (taken.fitted, [("a",), (), ("b",)])
     monkeypatch.setattr(_settling, "settled", lambda *given: state)
     monkeypatch.setattr(_settling, "simpler", lambda *given: pytest.fail("there is nothing to weigh"))
-    assert _settling.better_from(begun, state, lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
+    assert _settling.simpler_from(begun, state, lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
 
 
 # -- of several which -------------------------------------------------------------------------------------------------
@@ -242,7 +243,7 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
     )
     bound = STANDARD.alike * STANDARD.imperfection
     for by, told in ((0.999, near), (1.0, far), (1.001, far)):
-        monkeypatch.setattr(_settling, "apart", lambda *given, by=by: by * bound)
+        monkeypatch.setattr(_settling, "rms_difference", lambda *given, by=by: by * bound)
         assert _settling._is_simpler(new, state) is told
 
 
@@ -258,7 +259,7 @@ def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
 ) -> None:
     """Not where a law with no more effects leaves no more beside it than a good unit's imperfections do."""
     given = SimpleNamespace(sessions=())
-    state: Any = SimpleNamespace(thresholds=STANDARD, fit=told_fit(1.0, "c"), given=given)
+    state: Any = SimpleNamespace(thresholds=STANDARD, fit=told_fit(1.0, "c"), linearisation=given)
     lawful: Any = SimpleNamespace(fit=law)
     for by, told in ((0.999, near), (1.001, far)):
         left = {law.model.names: np.hypot(0.01, by * STANDARD.tolerable), ("c",): 0.01}
@@ -279,7 +280,9 @@ def test_evidence_is_weighed_under_the_lower_of_two_noises(monkeypatch: pytest.M
     )
 
     def state(given: str, noise_sd: float, members: int = 1) -> Any:
-        return SimpleNamespace(given=given, evidence=SimpleNamespace(noise_sd=noise_sd), start=(0,) * members)
+        return SimpleNamespace(
+            linearisation=given, evidence=SimpleNamespace(noise_sd=noise_sd), fitted_members=(0,) * members
+        )
 
     for own, others, is_enough in ((2.0, 3.0, False), (3.0, 2.0, False), (3.0, 3.0, True)):
         assert _settling._has_as_much_evidence(state("law", own), state("block", others)) is is_enough
@@ -296,17 +299,22 @@ def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
     ]  # fmt: skip
     evidence: Any = ToldEvidence(candidates, worth(1.0, 6.0, 5.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     state: Any = SimpleNamespace(
-        start=(0,), bends=True, best="best", given=evidence.given, evidence=evidence, banned=("gone",)
+        fitted_members=(0,),
+        exceeds_linear_range=True,
+        best="best",
+        linearisation=evidence.linearisation,
+        evidence=evidence,
+        banned=("gone",),
     )
-    assert [found if found == "best" else found.members for found in _settling._promising(state)] == [
+    assert [found if found == "best" else found.members for found in _settling._trial_sets(state)] == [
         "best", (0, 1), (0, 2), (0, 4),
     ]  # fmt: skip
-    state.bends = False
-    assert _settling._promising(state) == ["best"]
-    state.bends, state.start = True, tuple(range(7))
-    assert _settling._promising(state) == ["best"]
-    state.start = (0, 1, 2, 3, 5, 8)
-    assert len(_settling._promising(state)) > 1
+    state.exceeds_linear_range = False
+    assert _settling._trial_sets(state) == ["best"]
+    state.exceeds_linear_range, state.fitted_members = True, tuple(range(7))
+    assert _settling._trial_sets(state) == ["best"]
+    state.fitted_members = (0, 1, 2, 3, 5, 8)
+    assert len(_settling._trial_sets(state)) > 1
 
 
 def test_strengths_are_parameters_that_are_null_where_the_effect_is_not_there() -> None:
@@ -331,22 +339,24 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
     counts = {"plain": 1, "curved": 3, "bent": 3}
     costs = {"plain": 100.0, "curved": 95.0, "bent": 96.0}
 
-    def state(name: str, improved: float) -> Any:
+    def state(name: str, score_gain: float) -> Any:
         return SimpleNamespace(
-            name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
-            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), is_worth_a_fit=improved > 10.0,
+            name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), linearisation="given",
+            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), is_worth_a_fit=score_gain > 10.0,
             evidence=SimpleNamespace(odds=10.0), thresholds=STANDARD, banned=("z",), likelihood=lambda: "likelihood",
         )  # fmt: skip
 
-    monkeypatch.setattr(_settling, "_promising", lambda state: sorted(evidence))
+    monkeypatch.setattr(_settling, "_trial_sets", lambda state: sorted(evidence))
     monkeypatch.setattr(_settling, "_strengths", lambda model: counts[model])
     monkeypatch.setattr(
-        _settling, "fit_of", lambda _, model, __, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
+        _settling,
+        "fit_of_set",
+        lambda _, model, __, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps),
     )
     monkeypatch.setattr(
         _settling,
         "evidence_about",
-        lambda model, *rest: (SimpleNamespace(given=f"about {model}"), SimpleNamespace(score=evidence[model])),
+        lambda model, *rest: (SimpleNamespace(linearisation=f"about {model}"), SimpleNamespace(score=evidence[model])),
     )
     taken: list[Any] = []
 

@@ -20,7 +20,7 @@ from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._scale import Scale, full_scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
 from smartshoe.diagnosis._session import Session, prepare
-from smartshoe.diagnosis._validation import LeftOut, extrapolating
+from smartshoe.diagnosis._validation import LeftOut, extrapolating_effect
 from smartshoe.diagnosis._verdict import verdict_of
 from smartshoe.diagnosis._zero import zeros_of
 from smartshoe.models.effects import Conditions, effect
@@ -73,7 +73,7 @@ def test_validated_is_how_sure_a_gain_over_what_is_left_out_must_be(curved: Line
     found = fit(Likelihood(curved.sessions, 0.002, CURVED, STANDARD), CURVED)
 
     def refused(thresholds: Thresholds) -> bool:
-        return not LeftOut(curved.sessions, 0.002, found.model, thresholds).following(found).model.parts
+        return not LeftOut(curved.sessions, 0.002, found.model, thresholds).consistent(found).model.parts
 
     assert decides("validated", 0.5, 1e6, refused) == (False, True)
 
@@ -89,10 +89,10 @@ def test_foreseen_is_how_much_of_what_is_left_out_an_extension_must_do_away_with
 
 
 def test_memory_is_how_else_a_law_may_follow(curved: Linearised) -> None:
-    def departed(thresholds: Thresholds) -> float:
-        return Evidence(replace(curved, thresholds=thresholds), 0.002).posterior((_curve(curved),)).departed[0]
+    def departure_sds(thresholds: Thresholds) -> float:
+        return Evidence(replace(curved, thresholds=thresholds), 0.002).posterior((_curve(curved),)).departure_sds[0]
 
-    one, decades = decides("memory_s", (3.0,), (0.3, 3.0, 30.0), departed)
+    one, decades = decides("memory_s", (3.0,), (0.3, 3.0, 30.0), departure_sds)
     assert 0.0 < one != decades > 0.0
 
 
@@ -138,5 +138,5 @@ def test_tolerable_is_the_structure_that_a_good_unit_may_leave() -> None:
 def test_extrapolates_is_how_far_beyond_what_was_fitted_an_effect_is_believed() -> None:
     rated = MODEL.with_part(effect("rate_gain"), np.array([0.02, 0.4]))  # a tenth of the load, and of the rate
     sessions, _ = _sessions([_recording(rated, 0, peak=0.1), _recording(rated, 1)], [False, True])
-    strict, lax = decides("extrapolates", 2.0, 1e4, lambda t: extrapolating(sessions, rated, t))
+    strict, lax = decides("extrapolates", 2.0, 1e4, lambda t: extrapolating_effect(sessions, rated, t))
     assert (strict, lax) == ("rate_gain", None)

@@ -18,24 +18,24 @@ from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _validated
 from smartshoe.diagnosis._limits import (
-    crept_of,
-    elsewhere_of,
-    end_of_range_of,
-    in_a_tare_of,
-    led_back_of,
-    not_shown_of,
-    other_kind_of,
-    own_gains_of,
-    parted_clocks,
-    past_of,
-    worse_of,
-    zero_changes_said,
+    limit_clocks_disagree,
+    limit_curves_in_tare,
+    limit_held_out_excess,
+    limit_own_gains,
+    limit_rejected,
+    limit_relaxation_range,
+    limit_zero_drifted,
+    limit_zero_extrapolated,
+    limit_zero_jumps,
+    reason_not_shown,
+    reason_of_another_kind,
+    reason_tare_creeps,
 )
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._validation import cancelling
-from smartshoe.diagnosis._verdict import known_error, verdict_of
-from smartshoe.diagnosis._zero import Zero, _is_past, creeping
+from smartshoe.diagnosis._validation import cancelling_effects
+from smartshoe.diagnosis._verdict import fault_rms, verdict_of
+from smartshoe.diagnosis._zero import Zero, _may_have_drifted, creeping_tare
 from smartshoe.models.effects import effect, shift_of
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.extended import ExtendedModel
@@ -60,26 +60,26 @@ def test_a_lag_that_a_fit_sees_otherwise_is_said(sign: float, lag_s: float, off_
         for side in (1.0, -1.0):
             fitted = sign * lag_s + side * by * off_s
             model = MODEL.with_part("dead_band").with_part(told, np.array([fitted]))
-            said = parted_clocks([(told, value)], model, LONG, STANDARD)
+            said = limit_clocks_disagree([(told, value)], model, LONG, STANDARD)
             assert (said is not None) is is_said
             if said is not None:
                 way = "late" if sign > 0.0 else "early"
                 assert f"is {lag_s:.3g} s {way} by the edges of load and reading, {abs(fitted):.3g} s {way}" in said
     # One that is no longer in the model is as it was.
-    assert parted_clocks([(told, value)], MODEL, LONG, STANDARD) is None
+    assert limit_clocks_disagree([(told, value)], MODEL, LONG, STANDARD) is None
 
 
 def test_a_lag_is_that_of_all_that_is_late_in_the_middle_of_a_recording() -> None:
     delay, drift, lag = (effect(name) for name in ("delay", "clock_drift", "sensor_lag"))
     told = [(delay, np.array([0.2])), (drift, np.array([0.004]))]
     both = MODEL.with_part(delay, np.array([0.1])).with_part(drift, np.array([0.005]))
-    assert parted_clocks(told, both, LONG, STANDARD) is None
+    assert limit_clocks_disagree(told, both, LONG, STANDARD) is None
     early = MODEL.with_part(delay, np.array([0.1])).with_part(drift, np.array([0.002]))
-    said = str(parted_clocks(told, early, LONG, STANDARD))
+    said = str(limit_clocks_disagree(told, early, LONG, STANDARD))
     assert "is 0.6 s late by the edges of load and reading, 0.3 s late" in said
     beside = MODEL.with_part(delay, np.array([0.1])).with_part(lag, np.array([0.5, 0.1]))
-    assert parted_clocks(told, beside, LONG, STANDARD) is None
-    assert parted_clocks([(delay, np.array([0.2]))], beside, LONG, STANDARD) is not None
+    assert limit_clocks_disagree(told, beside, LONG, STANDARD) is None
+    assert limit_clocks_disagree([(delay, np.array([0.2]))], beside, LONG, STANDARD) is not None
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,9 @@ def test_an_effect_is_not_named_where_it_turns_into_one_of_another_kind(
     name: str, inside: list[float], at_bound: list[float] | None, told: str
 ) -> None:
     def said(values: list[float]) -> str | None:
-        return other_kind_of(_named(name), MODEL.with_part("linear_leak", [0.001]).with_part(name, values), STANDARD)
+        return reason_of_another_kind(
+            _named(name), MODEL.with_part("linear_leak", [0.001]).with_part(name, values), STANDARD
+        )
 
     assert said(inside) is None
     if at_bound is not None:
@@ -118,7 +120,7 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
         values = (
             [0.1, 0.3] if name in ("second_relaxation", "power_law_creep") else [early_s if name == "delay" else 0.001]
         )
-        return other_kind_of(_named(name), model.with_part(name, values), STANDARD)
+        return reason_of_another_kind(_named(name), model.with_part(name, values), STANDARD)
 
     for name in ("second_relaxation", "power_law_creep", "linear_leak", "delay"):
         assert said(name, MODEL) is None
@@ -139,30 +141,34 @@ def test_an_arm_that_creeps_beside_a_baseline_that_falls_may_be_the_walls_own() 
         ("second_relaxation", [0.1, 0.3], True), ("second_relaxation", [-0.1, 0.3], False),
         ("linear_leak", [0.1], False),
     ):  # fmt: skip
-        said = other_kind_of(_named(name), falling.with_part(name, np.array(values)), STANDARD)
+        said = reason_of_another_kind(_named(name), falling.with_part(name, np.array(values)), STANDARD)
         assert (said is not None) is is_told
-        assert other_kind_of(_named(name), MODEL.with_part(name, np.array(values)), STANDARD) is None
+        assert reason_of_another_kind(_named(name), MODEL.with_part(name, np.array(values)), STANDARD) is None
         assert said is None or said.startswith("second relaxation fits, but only beside a baseline that falls in holds")
 
 
 def test_a_block_that_follows_what_no_law_does_is_said_and_not_named_but_by_a_law_in_its_place() -> None:
-    block: Any = SimpleNamespace(effect=effect("sensor_lag"), member=SimpleNamespace(name="flexible_lag"), by=None)
+    block: Any = SimpleNamespace(
+        effect=effect("sensor_lag"), member=SimpleNamespace(name="flexible_lag"), law_in_place=None
+    )
 
     def said(direction: float) -> str | None:
-        return other_kind_of(block, MODEL.with_part("flexible_lag", np.array([0.03, direction])), STANDARD)
+        return reason_of_another_kind(block, MODEL.with_part("flexible_lag", np.array([0.03, direction])), STANDARD)
 
     for sign in (-1.0, 1.0):
         assert "the reading comes later one way than the other" in str(said(sign * 1.01 * STANDARD.law_departure))
         assert said(sign * 0.99 * STANDARD.law_departure) is None  # a law departs as far
-    block.by = "a law that misses little"
+    block.law_in_place = "a law that misses little"
     assert said(0.9) is None
-    kind: Any = SimpleNamespace(effect=effect("permanent_set"), member=SimpleNamespace(name="flexible_set"), by=None)
-    assert other_kind_of(kind, MODEL.with_part("flexible_set"), STANDARD) is None
+    kind: Any = SimpleNamespace(
+        effect=effect("permanent_set"), member=SimpleNamespace(name="flexible_set"), law_in_place=None
+    )
+    assert reason_of_another_kind(kind, MODEL.with_part("flexible_set"), STANDARD) is None
 
 
 def test_a_memory_of_which_single_load_cycles_show_nothing_is_said_with_what_would_show_it() -> None:
     once = Excitation((0.1, 0.5), (1.0,), frozenset({"rates"}), STANDARD, is_cycled=False)
-    told = str(not_shown_of(_named("permanent_set"), once))
+    told = str(reason_not_shown(_named("permanent_set"), once))
     assert told.startswith(
         "permanent set fits, but recordings of one load cycle cannot show it, so that it is not named; it needs loads"
         " held for some seconds, at several levels"
@@ -170,9 +176,9 @@ def test_a_memory_of_which_single_load_cycles_show_nothing_is_said_with_what_wou
     assert "; or rests without load" in told
     assert "pauses" not in told  # of which there are none before a second cycle
     for name in ("cycle_conditioning", "mullins_softening", "gain_drift"):  # shown by nothing but later cycles
-        assert str(not_shown_of(_named(name), once)).endswith("so that it is not named; it needs more load cycles")
-    assert not_shown_of(_named("second_relaxation"), once) is None
-    assert not_shown_of(_named("permanent_set"), replace(once, is_cycled=True)) is None
+        assert str(reason_not_shown(_named(name), once)).endswith("so that it is not named; it needs more load cycles")
+    assert reason_not_shown(_named("second_relaxation"), once) is None
+    assert reason_not_shown(_named("permanent_set"), replace(once, is_cycled=True)) is None
 
 
 @pytest.mark.parametrize(
@@ -183,9 +189,9 @@ def test_a_gain_that_goes_with_the_rate_is_not_named_where_no_two_rates_and_no_r
     rates_per_s: tuple[float, ...], is_held: bool, is_shown: bool
 ) -> None:
     data = Excitation(rates_per_s, (1.0,), frozenset(), STANDARD, is_held=is_held)
-    said = not_shown_of(_named("rate_gain"), data)
+    said = reason_not_shown(_named("rate_gain"), data)
     assert said is None if is_shown else "cannot show it, so that it is not named; it needs loads held" in str(said)
-    assert not_shown_of(_named("play_hysteresis"), data) is None  # a loop is seen at any one rate
+    assert reason_not_shown(_named("play_hysteresis"), data) is None  # a loop is seen at any one rate
 
 
 def _named(name: str) -> Any:
@@ -203,7 +209,7 @@ def test_what_faults_add_is_the_most_of_those_fitted_in_shares_of_the_reading() 
 
     def told(*errors: tuple[int, float]) -> float:
         faults: Any = [SimpleNamespace(recording=index, error=error) for index, error in errors]
-        return known_error(faults, sessions, SCALE)
+        return fault_rms(faults, sessions, SCALE)
 
     assert told((0, 7.0), (2, 1400.0), (0, 1.4)) == pytest.approx(0.1)
     assert told((0, 7.0), (2, 140.0)) == pytest.approx(0.05)
@@ -231,46 +237,50 @@ def test_what_is_worse_on_held_out_data_explains_a_part_at_most() -> None:
 def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
     won = Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0), is_certain=True)
     worse = "on held-out data the extended model is worse than the baseline (0.7 to 1.1 mbar, by 40 to 80 %)"
-    assert worse_of(won, "the held-out loads reach 900 N").startswith(f"{worse}: the held-out loads reach 900 N;")
+    assert limit_rejected(won, "the held-out loads reach 900 N").startswith(f"{worse}: the held-out loads reach 900 N;")
     alike = "the held-out loads are like the fitted ones, so that the session or the model is wrong"
     rejected = "it is rejected, so that model and calibration are the baseline's until"
-    assert worse_of(won, None).startswith(f"{worse}: {alike}; {rejected}")
+    assert limit_rejected(won, None).startswith(f"{worse}: {alike}; {rejected}")
     far = replace(won, ci95=(-1234.0, -40.0))
-    assert "by 40 to 1234 %" in worse_of(far, None)
-    assert "(0.7 to 1.1 mbar, which may be chance)" in worse_of(replace(won, is_certain=False), None)
+    assert "by 40 to 1234 %" in limit_rejected(far, None)
+    assert "(0.7 to 1.1 mbar, which may be chance)" in limit_rejected(replace(won, is_certain=False), None)
 
 
 def test_what_is_off_elsewhere_is_said_beside_what_was_fitted_and_the_loads_that_it_is_of() -> None:
     off = "held-out recordings are off by 19 % of full scale, fitted ones by 1.5 %"
-    assert elsewhere_of(0.19, 0.015, "the held-out loads reach 900 N") == f"{off}: the held-out loads reach 900 N"
+    assert (
+        limit_held_out_excess(0.19, 0.015, "the held-out loads reach 900 N") == f"{off}: the held-out loads reach 900 N"
+    )
     alike = (
         "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
         " changed, or the model follows the fitted ones for a wrong reason"
     )
-    assert elsewhere_of(0.19, 0.015, None) == f"{off}: {alike}"
+    assert limit_held_out_excess(0.19, 0.015, None) == f"{off}: {alike}"
 
 
 def test_a_past_is_said_in_the_readings_unit() -> None:
     zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
-    assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, replace(SCALE, reading=140.0))
-    assert "the zero stands at 7 mbar where" in past_of(zero, SCALE)  # it falls as the load grows
+    assert "the zero stands at -7 mbar where the recordings begin" in limit_zero_drifted(
+        zero, replace(SCALE, reading=140.0)
+    )
+    assert "the zero stands at 7 mbar where" in limit_zero_drifted(zero, SCALE)  # it falls as the load grows
 
 
 def test_of_a_curve_beside_a_tare_the_range_is_told_that_its_parameters_are_of() -> None:
     tare, offset = (Zero(shift_of(what), -0.375, 0.001, 0.4) for what in ("load", "reading"))
     curve, other = effect("sensor_nonlinearity"), effect("play_hysteresis")
-    (said,) = in_a_tare_of([offset, tare], [other, curve], SCALE, STANDARD)
+    (said,) = limit_curves_in_tare([offset, tare], [other, curve], SCALE, STANDARD)
     assert "full scale is 800 N of the load as logged, 500 N without the tare" in said
     assert "parameters of the sensor nonlinearity are of a curve over all of the former" in said
     small = replace(tare, value=0.999 * STANDARD.standing)
     for zeros, effects in (([offset], [curve]), ([tare], [other]), ([small], [curve]), ([tare], [])):
-        assert in_a_tare_of(zeros, effects, SCALE, STANDARD) == ()
+        assert limit_curves_in_tare(zeros, effects, SCALE, STANDARD) == ()
 
 
 def test_a_zero_that_is_seen_later_on_is_led_back_from_no_load() -> None:
     """Of a unit that was unloaded between its loads nothing is unknown but what was before the recordings."""
     shift = shift_of("reading")
-    for led_from, begins, asked in (
+    for extrapolated_from, begins, asked in (
         (0.019, "without load the reading stands at 7 mbar (5 %", "before the first load"),
         (
             0.021,
@@ -278,11 +288,11 @@ def test_a_zero_that_is_seen_later_on_is_led_back_from_no_load() -> None:
             "without load that the sensor can read",
         ),
     ):
-        zero = Zero(shift, 0.05, 0.01, 0.05, ("load_cell_tare",), led_from=led_from)
-        said = led_back_of(zero, replace(SCALE, reading=140.0), STANDARD)
+        zero = Zero(shift, 0.05, 0.01, 0.05, ("load_cell_tare",), extrapolated_from=extrapolated_from)
+        said = limit_zero_extrapolated(zero, replace(SCALE, reading=140.0), STANDARD)
         assert said.startswith(begins)
         assert said.endswith(f"(record a rest {asked})")
-        assert ("below such loads" in said) == (led_from > STANDARD.standing)
+        assert ("below such loads" in said) == (extrapolated_from > STANDARD.standing)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -294,12 +304,12 @@ def test_an_offset_that_a_drift_may_have_brought_is_of_its_past(monkeypatch: pyt
         first, last = moves[one.name]
         return sign * np.array([first, 7.0, last])
 
-    monkeypatch.setattr(_zero, "_drifted", drifted)
+    monkeypatch.setattr(_zero, "_drift_at_rest", drifted)
     kept = {"a": [True, True], "b": [False, True], "unfitted": [False, False]}
     sessions: Any = [SimpleNamespace(name=name, fitted=np.array(mask)) for name, mask in kept.items()]
-    for value, is_past in ((0.1999, True), (0.2001, False), (-0.1, False), (0.0, False)):
-        assert _is_past(sign * value, sessions, MODEL, STANDARD) is is_past
-    assert not _is_past(0.1, sessions[2:], MODEL, STANDARD)
+    for value, may_have_drifted in ((0.1999, True), (0.2001, False), (-0.1, False), (0.0, False)):
+        assert _may_have_drifted(sign * value, sessions, MODEL, STANDARD) is may_have_drifted
+    assert not _may_have_drifted(0.1, sessions[2:], MODEL, STANDARD)
 
 
 def test_a_drift_of_a_tenth_of_a_tare_may_be_the_tares_own() -> None:
@@ -307,21 +317,21 @@ def test_a_drift_of_a_tenth_of_a_tare_may_be_the_tares_own() -> None:
     tare, offset = (Zero(shift_of(signal), 0.05, 0.001, 0.04) for signal in ("load", "reading"))
     drift, gain = effect("warm_up"), effect("gain_drift")
     for size, told in ((0.004, tare), (0.004001, None)):
-        assert creeping([offset, tare], drift, size, STANDARD) is told
-    assert creeping([offset], drift, 0.001, STANDARD) is None
-    assert creeping([], drift, 0.001, STANDARD) is None
-    assert creeping([tare], gain, 0.001, STANDARD) is None
-    assert creeping([tare], drift, 0.004, replace(STANDARD, extrapolates=11.0)) is None
-    said = crept_of(SimpleNamespace(effect=drift, member=SimpleNamespace(size=0.0014)), tare)  # type: ignore[arg-type]
+        assert creeping_tare([offset, tare], drift, size, STANDARD) is told
+    assert creeping_tare([offset], drift, 0.001, STANDARD) is None
+    assert creeping_tare([], drift, 0.001, STANDARD) is None
+    assert creeping_tare([tare], gain, 0.001, STANDARD) is None
+    assert creeping_tare([tare], drift, 0.004, replace(STANDARD, extrapolates=11.0)) is None
+    said = reason_tare_creeps(SimpleNamespace(effect=drift, member=SimpleNamespace(size=0.0014)), tare)  # type: ignore[arg-type]
     assert "warm up moves the reading by 0.14 % of full scale, which a tare of 4 % may do" in said
 
 
 # -- what remembers ---------------------------------------------------------------------------------------------------
 def test_a_memory_counts_once_in_a_mean() -> None:
     noise = GaussMarkov(0.004, 0.375, 0.1, 0.1, 0.1, 0.0, STANDARD)
-    assert noise.of_a_mean(3.0) == pytest.approx(0.002)
-    assert noise.of_a_mean(0.75) == pytest.approx(0.004)
-    assert noise.of_a_mean(0.1) == pytest.approx(0.004)
+    assert noise.sd_of_mean(3.0) == pytest.approx(0.002)
+    assert noise.sd_of_mean(0.75) == pytest.approx(0.004)
+    assert noise.sd_of_mean(0.1) == pytest.approx(0.004)
 
 
 def test_what_neighbours_share_is_the_sum_of_their_products() -> None:
@@ -371,7 +381,7 @@ def test_effects_undo_each_other_where_their_powers_are_twice_that_of_all() -> N
     """Of one shape their sum is that of their sizes."""
 
     def told(**sizes: float) -> list[str]:
-        return cancelling([_session(), _session(False)], _Moving(tuple(sizes.items())), STANDARD)  # type: ignore[arg-type]
+        return cancelling_effects([_session(), _session(False)], _Moving(tuple(sizes.items())), STANDARD)  # type: ignore[arg-type]
 
     assert told(a=3.0, b=-2.0) == ["a", "b"]
     assert told(a=3.0, b=1.0) == []
@@ -405,26 +415,29 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
     class Left:
         def __init__(self, *given: Any) -> None: ...
 
-        def following(self, found: Any) -> Any:
+        def consistent(self, found: Any) -> Any:
             return SimpleNamespace(model=model("a", "b"))
 
-        def stands(self, one: Any, plain: Any) -> bool:
+        def is_validated(self, one: Any, plain: Any) -> bool:
             return True
 
     monkeypatch.setattr(_inference, "error_of", lambda sessions, one: left[one.names])
     monkeypatch.setattr(_inference, "LeftOut", Left)
-    monkeypatch.setattr(_inference, "fit_of", lambda *given: SimpleNamespace(model=model("a", "b")))
+    monkeypatch.setattr(_inference, "fit_of_set", lambda *given: SimpleNamespace(model=model("a", "b")))
     monkeypatch.setattr(
         _inference, "fit", lambda _, one, *steps: SimpleNamespace(model=one, cost=costs.get(one.names, 9.0))
     )
     monkeypatch.setattr(
-        _inference, "cancelling", lambda sessions, one, thresholds: list(one.names) if len(one.names) > 1 else []
+        _inference,
+        "cancelling_effects",
+        lambda sessions, one, thresholds: list(one.names) if len(one.names) > 1 else [],
     )
-    monkeypatch.setattr(_inference, "extrapolating", lambda *given: None)
+    monkeypatch.setattr(_inference, "extrapolating_effect", lambda *given: None)
     monkeypatch.setattr(_inference, "evidence_about", lambda one, other: (other, other.posterior((0,))))
     monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
     state: Any = SimpleNamespace(
-        given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
+        linearisation=evidence.linearisation, evidence=evidence, best=evidence.posterior((0, 1)),
+        thresholds=replace(STANDARD),
         fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda: "likelihood",
     )  # fmt: skip
     found: Any = _validated(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
@@ -435,9 +448,9 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
 
 def test_gains_of_their_own_are_said_with_the_recordings_that_lie_farthest_apart() -> None:
     gains = [OwnGain("b", 0.0, 0.0021), OwnGain("a", 0.0, -0.0134), OwnGain("c", 0.0, 0.0113)]
-    (said,) = own_gains_of(gains)
+    (said,) = limit_own_gains(gains)
     assert said.startswith("each recording has a gain of its own, from -1.3 % in a to +1.1 % in c beside that of all,")
-    assert own_gains_of([]) == []
+    assert limit_own_gains([]) == []
 
 
 def test_of_gains_that_change_the_largest_changes_are_said() -> None:
@@ -446,7 +459,7 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     assert [(one.recording, one.begins_s) for one in changes_of(gains)] == [
         ("a", 7.5), ("b", 7.5), ("b", 15.0), ("d", 15.0), ("d", 7.5),
     ]  # fmt: skip
-    (said,) = own_gains_of(gains)
+    (said,) = limit_own_gains(gains)
     assert said.startswith(
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
         " d and 1 more, as where a unit slips: all else is told with this allowed for, and no model foresees"
@@ -456,15 +469,15 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
 
 def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
     changes = [ZeroChange("a", 7.5 * k, 0.03 / k) for k in range(1, 7)]
-    (said,) = zero_changes_said(changes)
+    (said,) = limit_zero_jumps(changes)
     assert said.startswith(
         "the zero jumps, in shares of full scale, by +3 % at 7.5 s in a, by +1.5 % at 15 s in a, by +1 % at 22.5 s in"
         " a, by +0.75 % at 30 s in a and 2 more, as where a unit slips, water moves in a line or the room warms: jumps"
         " that are not seen may imitate any effect of the unit, so that none is more than half sure,"
     )
-    (late,) = zero_changes_said([ZeroChange("a", 1_700_000_007.54, 0.03)])
+    (late,) = limit_zero_jumps([ZeroChange("a", 1_700_000_007.54, 0.03)])
     assert "by +3 % at 1700000007.5 s in a" in late
-    assert zero_changes_said([]) == []
+    assert limit_zero_jumps([]) == []
 
 
 @pytest.mark.parametrize(
@@ -483,6 +496,8 @@ def test_a_unit_beyond_the_range_that_can_be_followed_is_told(
     with_own = {"residual_of": lambda one, model: one.reading - model.simulate(one.conditions)}
     for name, stand_in in with_own.items():
         monkeypatch.setattr(_validation, name, stand_in)
-    found = end_of_range_of(model, [session], STANDARD)
+    found = limit_relaxation_range(model, [session], STANDARD)
     assert (found is None) if said is None else (found is not None and said in found)
-    assert end_of_range_of(replace(model, relaxing_share=1e-4), [session], STANDARD) is None  # it relaxes by nothing
+    assert (
+        limit_relaxation_range(replace(model, relaxing_share=1e-4), [session], STANDARD) is None
+    )  # it relaxes by nothing

@@ -19,7 +19,7 @@ def test_what_is_off_elsewhere_is_held_against_what_was_fitted_at_the_same_rate(
     for parts.beyond, within in ((0.0, 0.07), (0.09, 0.09)):
         parts.seen.clear()
         run_diagnosis(parts)
-        assert parts.seen["off_elsewhere"][0] == ([FINE], [f"{FINE} 2"], within, STANDARD)
+        assert parts.seen["held_out_excess"][0] == ([FINE], [f"{FINE} 2"], within, STANDARD)
 
 
 def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explained(parts: Any) -> None:
@@ -31,11 +31,11 @@ def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explai
         parts.seen.clear()
         parts.unproven = unproven
         assert run_diagnosis(parts).verdict == verdict
-        sessions, residuals, left, thresholds, known, before = parts.seen["not_shown_to_be_noise"][0]
+        sessions, residuals, left, thresholds, known, before = parts.seen["untested_rms"][0]
         assert before is None
         assert (sessions, residuals) == ([FINE], [f"{FINE} 2"])  # at full rate
         assert (left is parts.kinds[1], thresholds, known) == (True, STANDARD, 0.0)
-        assert parts.seen["not_explained_of"][0][1:3] == (0.0, unproven)
+        assert parts.seen["unexplained_remark"][0][1:3] == (0.0, unproven)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_simulation_is_not_good_enough_where_no_test_would_show_what_is_left(p
         parts.kinds[1].is_tested, parts.names = is_tested, names
         assert run_diagnosis(parts).verdict == verdict
         if not is_tested:
-            before = parts.seen["not_shown_to_be_noise"][0][5]
+            before = parts.seen["untested_rms"][0][5]
             assert before == ([f"{FINE} 0"] if names else None)  # what the plain model leaves
 
 
@@ -146,7 +146,7 @@ def test_no_more_can_be_explained_than_is_left_beyond_noise_where_it_is_judged(p
         parts.found.can_validate, parts.unproven = can_validate, unproven
         told = run_diagnosis(parts)
         assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - judged**2) / 0.04))
-        sessions, residuals, thresholds = parts.seen["left_where_judged"][0]
+        sessions, residuals, thresholds = parts.seen["held_out_rms"][0]
         assert (sessions, residuals, thresholds) == ([FINE], [f"{FINE} 2"], STANDARD)  # at full rate
     parts.seen.clear()
     parts.judged = 1.0

@@ -15,19 +15,19 @@ from test_diagnosis_parts import MODEL, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._force import (
-    as_calibrated,
     compensation,
+    limit_calibration_off,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
-from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
-from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating, repeats, slow
-from smartshoe.diagnosis._limits import own_zeros_of
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, residual_of
+from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating_structure, repeats, slow_structure
+from smartshoe.diagnosis._limits import limit_own_zeros
+from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate
-from smartshoe.diagnosis._validation import extrapolating
+from smartshoe.diagnosis._validation import extrapolating_effect
 from smartshoe.diagnosis._zero import own_zeros
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
@@ -58,7 +58,7 @@ def test_a_recordings_own_offset_and_initial_state_are_taken_out(one: Session) -
     own = 0.03 - 0.02 * past
     noise = 1e-4 * np.random.default_rng(1).standard_normal(past.size)
     off = replace(one, reading=one.reading + own + noise)
-    found, added = own_of(off, MODEL, off.reading - MODEL.simulate(off.conditions))
+    found, added = own_terms_of(off, MODEL, off.reading - MODEL.simulate(off.conditions))
     assert found == pytest.approx([0.03, -0.02], abs=3e-4)
     assert added == pytest.approx(own, abs=3e-4)
     assert np.std(residual_of(off, MODEL)) == pytest.approx(1e-4, rel=0.1)
@@ -74,9 +74,9 @@ def test_an_initial_state_is_no_larger_than_what_the_arm_can_hold(one: Session) 
     loud -= beside @ np.linalg.lstsq(beside, loud, rcond=None)[0]
     loud *= share * np.sqrt(float(centred @ centred)) / np.std(loud)
     residual = loud + 0.1 * share * past
-    found, _ = own_of(one, MODEL, residual)
+    found, _ = own_terms_of(one, MODEL, residual)
     assert found[1] == pytest.approx(0.05 * share, rel=0.1)
-    stiff, _ = own_of(one, replace(MODEL, gain=0.1), residual)
+    stiff, _ = own_terms_of(one, replace(MODEL, gain=0.1), residual)
     assert abs(stiff[1]) < 0.2 * abs(found[1])
 
 
@@ -92,7 +92,7 @@ def test_slow_noise_is_not_led_back_to_first_cycles_that_are_held_out(one: Sessi
         assert np.max(np.abs(residual_of(off, MODEL)[held] - slow_noise[held])) < 2.5e-3
     loaded = replace(one, conditions=replace(one.conditions, load=one.conditions.load + 0.3), held_out=held)
     past = np.exp(-MODEL.pole_per_s * time_s)
-    own, _ = own_of(loaded, MODEL, 0.01 + 0.02 * past)
+    own, _ = own_terms_of(loaded, MODEL, 0.01 + 0.02 * past)
     assert own == pytest.approx([0.01, 0.02], rel=0.02)  # where nothing hides it, it is found
 
 
@@ -151,9 +151,9 @@ def test_an_effect_that_is_far_larger_in_what_was_not_fitted_is_beyond_knowledge
     tenth = replace(one, conditions=replace(one.conditions, load=0.1 * one.conditions.load, cache={}))
     held = replace(one, held_out=np.ones(one.reading.size, dtype=bool))
     railed = MODEL.with_part(effect("saturation"), np.array([0.5, 0.6, 0.01, 0.0]))
-    assert extrapolating([tenth, held], railed, STANDARD) == "saturation"
-    assert extrapolating([one, held], railed, STANDARD) is None
-    assert extrapolating([tenth, held], MODEL, STANDARD) is None
+    assert extrapolating_effect([tenth, held], railed, STANDARD) == "saturation"
+    assert extrapolating_effect([one, held], railed, STANDARD) is None
+    assert extrapolating_effect([tenth, held], MODEL, STANDARD) is None
 
 
 # -- structure --------------------------------------------------------------------------------------------------------
@@ -166,7 +166,7 @@ def test_what_repeats_is_as_large_as_it_is(sessions: list[Session]) -> None:
         residuals.append(bow + 1e-4 * np.random.default_rng(session.index).standard_normal(load.size))
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
-    found = repeating(sessions, residuals, STANDARD)
+    found = repeating_structure(sessions, residuals, STANDARD)
     assert found.rms == pytest.approx(np.sqrt(square / size), rel=0.1)
     assert found.z > 100.0
     # Nine presses of each of four rates, of which two rates press as long; each with each other one.
@@ -188,13 +188,13 @@ def test_what_repeats_in_fast_cycles_counts_for_the_time_that_they_take(sessions
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
     assert square > 0.0
-    assert repeating(sessions, residuals, STANDARD).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
+    assert repeating_structure(sessions, residuals, STANDARD).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
 
 
 def test_the_score_of_noise_that_repeats_by_chance_is_a_normal_deviate(sessions: list[Session]) -> None:
     rng = np.random.default_rng(11)
     scores = [
-        repeating(
+        repeating_structure(
             sessions, [lfilter([1.0], [1.0, -0.9], rng.standard_normal(s.reading.size)) for s in sessions], STANDARD
         ).z
         for _ in range(20)
@@ -205,9 +205,9 @@ def test_the_score_of_noise_that_repeats_by_chance_is_a_normal_deviate(sessions:
 
 def test_nothing_repeats_without_repeats(sessions: list[Session]) -> None:
     single = replace(sessions[0], cycle=np.zeros(sessions[0].reading.size, dtype=np.intp))
-    assert repeating([single], [np.ones(single.reading.size)], STANDARD) == NOTHING
+    assert repeating_structure([single], [np.ones(single.reading.size)], STANDARD) == NOTHING
     short = [replace(s, reading=s.reading[:50], usable=s.usable[:50]) for s in sessions]
-    assert slow(short, [np.ones(50) for _ in short], STANDARD) == NOTHING
+    assert slow_structure(short, [np.ones(50) for _ in short], STANDARD) == NOTHING
 
 
 def test_cycles_with_lacking_samples_are_left_out(sessions: list[Session]) -> None:
@@ -236,10 +236,10 @@ def test_rows_of_a_kind_are_the_residual_along_the_cycle(sessions: list[Session]
 def test_means_of_noise_vary_as_its_own_fast_part_says(sessions: list[Session], colour: float) -> None:
     rng = np.random.default_rng(3)
     noise = [lfilter([1.0], [1.0, -colour], rng.standard_normal(s.reading.size)) for s in sessions]
-    assert abs(slow(sessions, noise, STANDARD).z) < 3.0
+    assert abs(slow_structure(sessions, noise, STANDARD).z) < 3.0
     sines = [3.0 * np.sin(2 * np.pi * s.conditions.time_s / 60.0) for s in sessions]
     wander = [one + sine for one, sine in zip(noise, sines, strict=True)]
-    found = slow(sessions, wander, STANDARD)
+    found = slow_structure(sessions, wander, STANDARD)
     assert found.z > 3.0
     assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=0.25)
     blocks = sum(int(s.conditions.time_s[-1] / STANDARD.lasting_s) for s in sessions)
@@ -250,7 +250,7 @@ def test_a_jump_in_one_block_makes_it_no_loud_noise(sessions: list[Session]) -> 
     session = sessions[0]
     noise = 1e-3 * np.random.default_rng(5).standard_normal(session.reading.size)
     stepped = noise + 0.01 * (session.conditions.time_s > 0.5 * session.conditions.time_s[-1])
-    assert slow([session], [stepped], STANDARD).z > 10.0
+    assert slow_structure([session], [stepped], STANDARD).z > 10.0
 
 
 def test_what_is_beyond_white_noise_is_the_rest_of_the_power(sessions: list[Session]) -> None:
@@ -270,11 +270,17 @@ def _memory(**changes: Any) -> GaussMarkov:
 
 def test_noise_is_white_gaussian_deaf_to_the_load_and_quick_enough() -> None:
     assert _memory().is_noise
-    for off in ({"coloured": 9.0}, {"surprises": 9.0}, {"surprises": -9.0}, {"follows": 9.0}, {"tau_s": 9.0}):
+    for off in (
+        {"spectrum_statistic": 9.0},
+        {"kurtosis_z": 9.0},
+        {"kurtosis_z": -9.0},
+        {"load_z": 9.0},
+        {"tau_s": 9.0},
+    ):
         assert not _memory(**off).is_noise
-    assert _memory(surprises=50.0, flatness=-1.8).switches
-    for off in ({"coloured": 9.0}, {"follows": 9.0}, {"flatness": 0.0}, {"surprises": 3.0}):
-        assert not _memory(**{"surprises": 50.0, "flatness": -1.8, **off}).switches
+    assert _memory(kurtosis_z=50.0, excess_kurtosis=-1.8).switches
+    for off in ({"spectrum_statistic": 9.0}, {"load_z": 9.0}, {"excess_kurtosis": 0.0}, {"kurtosis_z": 3.0}):
+        assert not _memory(**{"kurtosis_z": 50.0, "excess_kurtosis": -1.8, **off}).switches
 
 
 def test_the_structure_is_the_largest_of_what_stands_out() -> None:
@@ -290,7 +296,7 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
     assert (swings.rms, swings.how) == (0.003, "is correlated over time")
     assert (left(quiet, quiet).rms, left(quiet, quiet).significant) == (0.0, False)
     # Noise with a memory is no structure; what has a memory and is no noise is, though no larger than all there is.
-    noise, other = _memory(), _memory(coloured=9.0)
+    noise, other = _memory(), _memory(spectrum_statistic=9.0)
     assert left(quiet, wandering, noise).is_noise
     assert not left(quiet, wandering, noise).significant
     assert left(repeated, wandering, noise).rms == 0.003
@@ -304,9 +310,9 @@ def test_what_wanders_is_noise_that_remembers_and_what_changes_slowly_but_not_wh
     noise = _memory(tau_s=0.75, rms=0.004)
     for repeats_, slow_, memory, most in (
         (quiet, wandering, None, 0.002), (repeated, wandering, None, 0.0), (quiet, quiet, None, 0.0),
-        (quiet, wandering, noise, 0.004 / math.sqrt(2.0)), (quiet, quiet, replace(noise, coloured=9.0), 0.0),
+        (quiet, wandering, noise, 0.004 / math.sqrt(2.0)), (quiet, quiet, replace(noise, spectrum_statistic=9.0), 0.0),
     ):  # fmt: skip
-        assert ResidualStructure(repeats_, slow_, memory, "", 0.0035).wanders(3.0) == pytest.approx(most)
+        assert ResidualStructure(repeats_, slow_, memory, "", 0.0035).sd_of_mean(3.0) == pytest.approx(most)
 
 
 def test_what_is_left_is_tested_where_a_test_would_show_all_of_it() -> None:
@@ -377,7 +383,7 @@ def test_a_memory_is_known_by_its_time_and_size_whatever_the_level(sessions: lis
         assert found.rms == pytest.approx(0.01, rel=0.3)
         assert lifted is not None
         assert lifted.rms == pytest.approx(found.rms, rel=1e-3)
-        assert (lifted.tau_s, lifted.flatness) == (found.tau_s, pytest.approx(found.flatness))
+        assert (lifted.tau_s, lifted.excess_kurtosis) == (found.tau_s, pytest.approx(found.excess_kurtosis))
 
 
 def test_samples_that_lack_surprise_nobody(sessions: list[Session]) -> None:
@@ -398,7 +404,7 @@ def test_correlation_is_not_looked_for_across_what_lacks() -> None:
     kept = np.ones(white.size, dtype=bool)
     kept[5000:9000] = False
     spoilt = np.where(kept, 2.0 + white, 400.0)
-    assert correlated_sd([spoilt, white], [kept, np.zeros(white.size, dtype=bool)]) == pytest.approx(1.0, rel=0.1)
+    assert effective_noise_sd([spoilt, white], [kept, np.zeros(white.size, dtype=bool)]) == pytest.approx(1.0, rel=0.1)
 
 
 @pytest.fixture(scope="module")
@@ -443,13 +449,13 @@ def test_kinds_of_noise_are_told_recording_by_recording(fine: list[Session]) -> 
 
 def test_coloured_noise_is_told_where_no_structure_would_be_taken_for_it(fine: list[Session]) -> None:
     rng = np.random.default_rng(14)
-    coloured = [0.004 * _remembering(s, 0.2, rng) for s in fine]
+    spectrum_statistic = [0.004 * _remembering(s, 0.2, rng) for s in fine]
     both = [("coloured_noise", 0), ("coloured_noise", 1)]
-    assert [one for one in _kinds(fine, coloured) if one[0] == "coloured_noise"] == both
+    assert [one for one in _kinds(fine, spectrum_statistic) if one[0] == "coloured_noise"] == both
     assert _kinds(fine, _white(fine), memory=_memory()) == both
-    assert [one for one in _kinds(fine, coloured, memory=_memory()) if one[0] == "coloured_noise"] == both
-    assert "coloured_noise" not in dict(_kinds(fine, coloured, explained=False))
-    assert _kinds(fine, _white(fine), memory=_memory(coloured=9.0)) == []
+    assert [one for one in _kinds(fine, spectrum_statistic, memory=_memory()) if one[0] == "coloured_noise"] == both
+    assert "coloured_noise" not in dict(_kinds(fine, spectrum_statistic, explained=False))
+    assert _kinds(fine, _white(fine), memory=_memory(spectrum_statistic=9.0)) == []
     assert _kinds(fine, _white(fine), memory=_memory(rms=1e-5)) == []
     (first, _) = noise_kinds(fine, MODEL, [], True, 1e-4, _memory(tau_s=1.25))
     assert "1.2 s" in first.says
@@ -464,14 +470,14 @@ def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_th
     moved = clean[1].with_channel(sensor.with_values(sensor.values + 0.05 * MODEL.full_scale_reading))
     sessions, scale = sessions_of(*clean)
     assert own_zeros(sessions, MODEL, STANDARD) is None
-    assert own_zeros_of(None, scale) == []
+    assert limit_own_zeros(None, scale) == []
     sessions, scale = sessions_of(clean[0], moved)
     zeros = own_zeros(sessions, MODEL, STANDARD)
     assert zeros is not None
     assert np.ptp(zeros.offsets) == pytest.approx(0.05, rel=0.05)
     bent = MODEL.with_part("dead_band", np.array([0.2, 0.3, 0.0]))
     assert own_zeros(sessions, bent, STANDARD) is None  # where as much is left it may be the model's error
-    (said,) = own_zeros_of(zeros, scale)
+    (said,) = limit_own_zeros(zeros, scale)
     assert "% of full scale) in triangles_1 to " in said
     read = scale.zero + float(zeros.offsets[0]) * scale.reading  # as it is logged
     assert f"from {read:.3g} {scale.unit.symbol} (" in said
@@ -483,8 +489,8 @@ def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_th
     judged = own_zeros([sessions[0], held], MODEL, STANDARD)  # what is judged has one too, and makes no mean
     assert judged is not None
     # One zero for both is off by half of what they differ by; and one recording that begins so is told.
-    (said,) = as_calibrated(compensation(sessions, MODEL, MODEL, STANDARD), STANDARD)
+    (said,) = limit_calibration_off(compensation(sessions, MODEL, MODEL, STANDARD), STANDARD)
     off_n = 0.025 / MODEL.gain * scale.load_n
     assert float(said.split("is off by ")[1].split(" N (rms)")[0]) == pytest.approx(off_n, rel=0.2)
     alike, _ = sessions_of(clean[0], clean[1])
-    assert as_calibrated(compensation(alike, MODEL, MODEL, STANDARD), STANDARD) == []
+    assert limit_calibration_off(compensation(alike, MODEL, MODEL, STANDARD), STANDARD) == []

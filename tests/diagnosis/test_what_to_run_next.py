@@ -16,7 +16,7 @@ from smartshoe import Protocol, Recording, diagnose
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS, paced
 from smartshoe.diagnosis._likelihood import fit
-from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
+from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _protocol_for_missing_excitation
 from smartshoe.diagnosis._prepared import prepared as made_ready
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._sensitivity import logged_words
@@ -151,14 +151,14 @@ def _lacking(*words: str) -> Excitation:
 )
 def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None:
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
-    told = _unseen(found, (), _lacking(word), STEP_S)
+    told = _protocol_for_missing_excitation(found, (), _lacking(word), STEP_S)
     assert told.protocol == protocol
     assert told.steps is not None
     assert (told.steps.name, told.steps.peak_load_n) == (protocol, pytest.approx(800.0, rel=0.06))
     assert told.says == (
         f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
     )
-    assert _unseen(found, (), _lacking(), STEP_S).protocol == "repeat"
+    assert _protocol_for_missing_excitation(found, (), _lacking(), STEP_S).protocol == "repeat"
     # It shows what it is run for.
     step_s = 0.01 if word == "steps" else STEP_S
     load = told.steps.load_at(np.arange(0.0, told.steps.duration_s, step_s)) / 800.0
@@ -168,19 +168,30 @@ def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None
 def test_where_peaks_go_with_the_clock_they_are_shuffled_first() -> None:
     """That alone leaves every cause half sure; of one peak load it is as good as what else is lacking."""
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
-    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads"), STEP_S).protocol == "shuffled_loads"
-    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads", "peaks"), STEP_S).protocol == "rates"
+    assert (
+        _protocol_for_missing_excitation(found, (), _lacking("rates", "steps", "shuffled_loads"), STEP_S).protocol
+        == "shuffled_loads"
+    )
+    assert (
+        _protocol_for_missing_excitation(
+            found, (), _lacking("rates", "steps", "shuffled_loads", "peaks"), STEP_S
+        ).protocol
+        == "rates"
+    )
 
 
 def test_of_what_lacks_that_comes_first_which_tells_the_pair() -> None:
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
     lacking = "rates", "rests", "pauses", "steps"
     told = {
-        rivals: _unseen(found, rivals, _lacking(*lacking), STEP_S).protocol for rivals in ((), ("delay", "sensor_lag"))
+        rivals: _protocol_for_missing_excitation(found, rivals, _lacking(*lacking), STEP_S).protocol
+        for rivals in ((), ("delay", "sensor_lag"))
     }
     assert told == {(): "rates", ("delay", "sensor_lag"): "steps"}
     clocked = _lacking(*lacking, "shuffled_loads")
-    assert _unseen(found, ("delay", "sensor_lag"), clocked, STEP_S).protocol == "shuffled_loads"
+    assert (
+        _protocol_for_missing_excitation(found, ("delay", "sensor_lag"), clocked, STEP_S).protocol == "shuffled_loads"
+    )
 
 
 @pytest.mark.parametrize(

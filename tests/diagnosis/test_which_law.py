@@ -23,8 +23,8 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
     """By law what its fit costs, and a shape it ends at; any other law explains nothing."""
     told: dict[str, tuple[float, float]] = {}
 
-    def curved(law: Any, model: ExtendedModel, likelihood: Any, *, beside: ExtendedModel) -> Any:
-        assert beside.names == ()
+    def curved(law: Any, model: ExtendedModel, likelihood: Any, *, other_arm: ExtendedModel) -> Any:
+        assert other_arm.names == ()
         cost, shape = told.get(law.name, (NOTHING_COST, USUAL))
         values = law.start()
         for k, parameter in enumerate(law.parameters):
@@ -33,7 +33,7 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
         return SimpleNamespace(model=model.with_part(law, values), cost=cost, law=law.name)
 
     monkeypatch.setattr(_laws, "fit_with", curved)
-    monkeypatch.setattr(_laws, "weighed", lambda likelihood, model: SimpleNamespace(cost=likelihood.cost(model)))
+    monkeypatch.setattr(_laws, "evaluated", lambda likelihood, model: SimpleNamespace(cost=likelihood.cost(model)))
     monkeypatch.setattr(_laws, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model, cost=NOTHING_COST))
     return told
 
@@ -115,7 +115,7 @@ def test_a_curve_that_gave_way_to_a_law_does_not_come_back_as_another_curve() ->
     curves = {block.name for block in flexible if block.is_memoryless}
     assert curves
     for block in flexible:
-        assert set(_laws._replaced_with(block)) == (curves if block.name in curves else {block.name})
+        assert set(_laws._blocks_banned_for(block)) == (curves if block.name in curves else {block.name})
 
 
 def test_a_law_that_stands_beside_a_block_may_do_without_it(costs: dict[str, tuple[float, float]]) -> None:

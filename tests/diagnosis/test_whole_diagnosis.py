@@ -13,7 +13,7 @@ from scipy.signal import lsim
 
 from smartshoe import Recording, compensate, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
-from smartshoe.diagnosis._diagnose import _outside
+from smartshoe.diagnosis._diagnose import _pulled_reason
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._lack_of_fit import LackOfFit
 from smartshoe.diagnosis._procedure import _with_offset
@@ -21,12 +21,12 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._verdict import (
-    left_where_judged,
+    held_out_excess,
+    held_out_rms,
     names_in,
-    not_explained_of,
-    not_shown_to_be_noise,
-    off_elsewhere,
     sentence_of,
+    unexplained_remark,
+    untested_rms,
     verdict_of,
 )
 from smartshoe.diagnosis._zero import Zero, offsets
@@ -241,7 +241,7 @@ def test_a_load_that_pulls_as_much_as_it_presses_is_refused_in_newtons(runs: lis
     tared = Recording.from_arrays(
         time_s=runs[0].time_s, force_n=runs[0].force_n - 40.0, pressure_mbar=runs[0].sensor.values, name="tared"
     )
-    assert _outside(tared, Thresholds()) is None
+    assert _pulled_reason(tared, Thresholds()) is None
 
 
 def _left(rms: float) -> ResidualStructure:
@@ -256,7 +256,7 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
 
     def said(causes: Any, left: float) -> tuple[str, str]:
         verdict = verdict_of(causes, _left(large if causes else left), _left(left), limits)
-        rest = not_explained_of(_left(left), 0.0, 0.0, limits)
+        rest = unexplained_remark(_left(left), 0.0, 0.0, limits)
         return verdict, sentence_of(verdict, names_in(causes, 0), before, after, rest, limits)
 
     good = "the baseline simulation is good to 2 % of full scale on data it was not fitted to"
@@ -272,7 +272,7 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     usual = 0.9 * limits.departure * large
     assert usual > limits.tolerable
     assert verdict_of(causes[:1], _left(large), _left(usual), limits) == "explained"
-    assert verdict_of(causes[:1], _left(large), _left(usual), limits, follows=False) == "partly_explained"
+    assert verdict_of(causes[:1], _left(large), _left(usual), limits, is_lawful=False) == "partly_explained"
     between = 0.5 * (limits.material + limits.tolerable)
     assert said([], between) == (
         "adequate",
@@ -296,11 +296,11 @@ def test_what_is_left_is_measured_by_what_was_wrong_before() -> None:
 def test_what_a_grid_adds_is_left_whatever_the_model() -> None:
     limits = Thresholds()
     left = 3.0 * limits.tolerable
-    for known, verdict in ((0.0, "unexplained"), (0.9 * left, "unexplained"), (1.1 * left, "adequate")):
-        assert verdict_of([], _left(left), _left(left), limits, known=known) == verdict
+    for fault_error, verdict in ((0.0, "unexplained"), (0.9 * left, "unexplained"), (1.1 * left, "adequate")):
+        assert verdict_of([], _left(left), _left(left), limits, fault_error=fault_error) == verdict
     causes: Any = [SimpleNamespace(name="dead_band")]
     assert verdict_of(causes, _left(left), _left(left), limits) == "partly_explained"
-    assert verdict_of(causes, _left(left), _left(left), limits, known=1.1 * left) == "explained"
+    assert verdict_of(causes, _left(left), _left(left), limits, fault_error=1.1 * left) == "explained"
 
 
 def test_the_offset_that_readings_have_stands_in_the_model_named_or_not(runs: list[Recording]) -> None:
@@ -382,10 +382,10 @@ def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() ->
         (0.02, 0.011, 0.0),
         (0.02, 0.009, 0.02),
     ):
-        told = off_elsewhere([fitted, apart], [10.0 * wave, size * wave + 0.001 * noise], within, limits)
+        told = held_out_excess([fitted, apart], [10.0 * wave, size * wave + 0.001 * noise], within, limits)
         assert told == pytest.approx(off, rel=0.05)
-    assert off_elsewhere([fitted], [wave], 0.0, limits) == 0.0  # every recording is fitted in part
-    assert off_elsewhere([fitted, apart], [wave, 0.05 * noise], 0.0, limits) == 0.0
+    assert held_out_excess([fitted], [wave], 0.0, limits) == 0.0  # every recording is fitted in part
+    assert held_out_excess([fitted, apart], [wave, 0.05 * noise], 0.0, limits) == 0.0
 
 
 def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_than_tolerable() -> None:
@@ -396,20 +396,20 @@ def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_th
     untested, tested = _left(0.0), SimpleNamespace(is_noise=True)
     for size, left in ((0.9 * limits.tolerable, 0.0), (1.1 * limits.tolerable, 1.1 * limits.tolerable)):
         residuals = [size * wave + one for one in noise]  # of what was fitted and of what was not
-        assert not_shown_to_be_noise(sessions, residuals, untested, limits) == pytest.approx(left, rel=0.1)
-        assert not_shown_to_be_noise(sessions, residuals, tested, limits) == 0.0  # type: ignore[arg-type]
+        assert untested_rms(sessions, residuals, untested, limits) == pytest.approx(left, rel=0.1)
+        assert untested_rms(sessions, residuals, tested, limits) == 0.0  # type: ignore[arg-type]
         # Beside causes it is no more than laws depart by of what was wrong.
         for ratio, is_left in ((0.9, True), (1.1, False)):
             wrong = [ratio / limits.departure * one for one in residuals]
-            found = not_shown_to_be_noise(sessions, residuals, untested, limits, 0.0, wrong)  # type: ignore[arg-type]
+            found = untested_rms(sessions, residuals, untested, limits, 0.0, wrong)  # type: ignore[arg-type]
             assert found == pytest.approx(left if is_left else 0.0, rel=0.1)
     elsewhere = [noise[0], 0.02 * wave + noise[1]]
-    half = not_shown_to_be_noise(sessions, elsewhere, untested, limits)
+    half = untested_rms(sessions, elsewhere, untested, limits)
     assert half == pytest.approx(0.02 / np.sqrt(2.0), rel=0.05)
     # The most that a better model could do away with is what is left of it where it is judged.
-    assert left_where_judged(sessions, elsewhere, limits) == pytest.approx(0.02, rel=0.02)
-    assert left_where_judged(sessions, elsewhere[::-1], limits) < 3e-4
-    assert left_where_judged(sessions[:1], elsewhere[1:], limits) == 0.0  # nothing of it is held out
+    assert held_out_rms(sessions, elsewhere, limits) == pytest.approx(0.02, rel=0.02)
+    assert held_out_rms(sessions, elsewhere[::-1], limits) < 3e-4
+    assert held_out_rms(sessions[:1], elsewhere[1:], limits) == 0.0  # nothing of it is held out
 
 
 def test_what_the_baseline_leaves_open_is_not_said_to_be_mended() -> None:

@@ -16,7 +16,7 @@ from smartshoe.diagnosis import Thresholds, diagnose
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._limits import wall_ratio_of
+from smartshoe.diagnosis._limits import limit_wall_ratio
 from smartshoe.diagnosis._scale import Scale, full_scale
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
@@ -56,10 +56,12 @@ def _sessions(*runs: Recording) -> tuple[list[Session], Scale]:
     return prepare(runs, usable, [False] * len(runs), scale, [1], STANDARD), scale
 
 
-def _zeros(*runs: Recording, left: float = 0.0, remembered: float = 0.0, rubbed: float = 0.0) -> dict[str, Zero]:
+def _zeros(
+    *runs: Recording, left: float = 0.0, remembered: float = 0.0, lasting_memory: float = 0.0
+) -> dict[str, Zero]:
     sessions, scale = _sessions(*runs)
     model = baseline_of(sessions, scale)
-    found = zeros_of(sessions, model, scale, left, remembered, STANDARD, rubbed=rubbed)
+    found = zeros_of(sessions, model, scale, left, remembered, STANDARD, lasting_memory=lasting_memory)
     return {one.effect.name: one for one in found}
 
 
@@ -165,14 +167,17 @@ def test_a_unit_that_is_never_unloaded_leaves_open_which_zero_it_is() -> None:
     assert not found["zero_offset"].is_seen
     # Whatever the model leaves or remembers may lie in the offset too.
     assert _zeros(*runs, left=0.05) == {}
-    assert found["zero_offset"].led_from == 0.0
-    assert _zeros(*runs, remembered=0.5)["zero_offset"].led_from == pytest.approx(
+    assert found["zero_offset"].extrapolated_from == 0.0
+    assert _zeros(*runs, remembered=0.5)["zero_offset"].extrapolated_from == pytest.approx(
         0.1, rel=0.05
     )  # so that it is no cause
     known = found["zero_offset"].sd
     # What a loop holds does not fade, however little it begins with.
-    rubbed = _zeros(*runs, rubbed=0.05)["zero_offset"]
-    assert (rubbed.led_from, rubbed.sd) == (pytest.approx(0.1, rel=0.05), pytest.approx(np.hypot(known, 0.05), rel=0.1))
+    lasting_memory = _zeros(*runs, lasting_memory=0.05)["zero_offset"]
+    assert (lasting_memory.extrapolated_from, lasting_memory.sd) == (
+        pytest.approx(0.1, rel=0.05),
+        pytest.approx(np.hypot(known, 0.05), rel=0.1),
+    )
     assert _zeros(*runs, left=0.01)["zero_offset"].sd == pytest.approx(np.hypot(known, 0.01), rel=0.05)
     assert _zeros(*runs, remembered=0.1)["zero_offset"].sd > known
 
@@ -210,12 +215,12 @@ def test_an_offset_that_a_drift_of_the_zero_may_have_come_by_is_its_past(sign: f
     """It lies the way that the zero drifts, and within an order of magnitude of what it drifts by in a recording."""
     duration_s = float(TIME_S[-1])
     sessions, scale = _sessions(_run(offset=0.03 * sign, seed=1), _run(offset=0.03 * sign, seed=2))
-    for moved, is_past in ((0.006, True), (0.0015, False), (0.0, False), (-0.006, False)):
+    for moved, may_have_drifted in ((0.006, True), (0.0015, False), (0.0, False), (-0.006, False)):
         drift = np.array([sign * moved / duration_s, 0.0, 0.0, 1.0])
         drifting = baseline_of(sessions, scale).with_part(effect("zero_drift"), drift)
         (found,) = zeros_of(sessions, drifting, scale, 0.0, 0.0, STANDARD)
         assert found.effect.name == "zero_offset"
-        assert found.is_past == is_past
+        assert found.may_have_drifted == may_have_drifted
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -227,7 +232,7 @@ def test_an_offset_beside_a_neighbour_is_none_of_a_drift(sign: float) -> None:
     pressed = baseline_of(sessions, scale).with_part(effect("cross_talk"), np.array([0.01 * sign]))
     (found,) = zeros_of(beside_them, pressed, scale, 0.0, 0.0, STANDARD)
     assert found.effect.name == "zero_offset"
-    assert not found.is_past
+    assert not found.may_have_drifted
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -239,7 +244,9 @@ def test_no_tare_is_told_where_a_drift_may_have_come_by_what_is_read_beyond_the_
         sessions, scale = _sessions(*runs)
         drift = np.array([sign * moved / duration_s, 0.0, 0.0, 1.0])
         drifting = baseline_of(sessions, scale).with_part(effect("zero_drift"), drift)
-        return [(one.effect.name, one.is_past) for one in zeros_of(sessions, drifting, scale, 0.0, 0.0, STANDARD)]
+        return [
+            (one.effect.name, one.may_have_drifted) for one in zeros_of(sessions, drifting, scale, 0.0, 0.0, STANDARD)
+        ]
 
     shown = [_run(tare=0.018, offset=0.018 + 0.03 * sign, seed=seed) for seed in (1, 2)]
     both = {"load_cell_tare", "zero_offset"}
@@ -313,25 +320,25 @@ def test_what_a_leak_or_heat_does_goes_with_how_stiff_the_wall_is_which_is_said_
     rms = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
     assert rms > 0.0
     for material, is_said in ((0.999 * rms, True), (1.001 * rms, False)):
-        assert (wall_ratio_of(model, sessions, replace(STANDARD, material=material)) is not None) is is_said
+        assert (limit_wall_ratio(model, sessions, replace(STANDARD, material=material)) is not None) is is_said
     sensitive = replace(STANDARD, material=0.999 * rms)
-    assert wall_ratio_of(model, sessions, sensitive) == (
+    assert limit_wall_ratio(model, sessions, sensitive) == (
         "how stiff the wall is beside the gas is not known (N = 1.6 is taken, units of the paper have 1.51 to 1.78):"
         " rates of leaks and times of heat go with it, beyond their intervals (declare effective_area_m2)"
     )
     for runs in ((declared, bare), (bare, declared)):
         told, scale = _sessions(*runs)
-        assert wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is None
+        assert limit_wall_ratio(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is None
     # An area that no wall has tells nothing, which is said even where it decides over nothing.
     told, scale = _sessions(_run(seed=1, effective_area_m2=1.0), bare)
     for thresholds in (sensitive, replace(STANDARD, material=0.4)):
-        said = wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, thresholds)
+        said = limit_wall_ratio(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, thresholds)
         assert said is not None
         assert said.endswith(
             "(mend effective_area_m2: the declared one makes an N beyond 1.02 to 50, which no tube has)"
         )
     # Without either it decides over nothing.
-    assert wall_ratio_of(MODEL.with_part("dead_band"), sessions, replace(STANDARD, material=1e-12)) is None
+    assert limit_wall_ratio(MODEL.with_part("dead_band"), sessions, replace(STANDARD, material=1e-12)) is None
 
 
 @pytest.mark.parametrize("declared", ["40 cm2", "nan", "0", "-0.004"])

@@ -16,11 +16,11 @@ from scipy.stats import t as student
 
 from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock
-from smartshoe.diagnosis._held_out import past_of
+from smartshoe.diagnosis._held_out import initial_memory_of
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, sd_of_a_mean, zeros_of
+from smartshoe.diagnosis._zero import _drift_at_rest, _zero_by_model, first_rests, offsets, sd_of_a_mean, zeros_of
 from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.extended import ExtendedModel
@@ -39,7 +39,7 @@ MANY = float(norm.isf(0.5 * STANDARD.false_alarm))
 def _no_past(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is remembered at a rest, but where a test is about it."""
     if "past" not in request.node.name:
-        monkeypatch.setattr(_zero, "past_of", lambda *given: (0.0, 0.0))
+        monkeypatch.setattr(_zero, "initial_memory_of", lambda *given: (0.0, 0.0))
 
 
 # -- zeros that are seen ----------------------------------------------------------------------------------------------
@@ -139,7 +139,7 @@ def _session(load: Array, fitted: Any = None) -> Any:
         conditions=Conditions(0.1 * np.arange(load.size), load, 0.1), fitted=kept, reading=0.0 * load,
         resting=np.abs(load) < 0.02, recording=SimpleNamespace(command_n=None, metadata={}), thinned=1,
         own_gain_sd=0.0, gain_parts=(), zero_changes=(), gap_ends=(),
-        quiet=SimpleNamespace(raw=0.0), white_sd=0.0,
+        denoised=SimpleNamespace(raw_sd=0.0), white_sd=0.0,
     )  # fmt: skip
 
 
@@ -153,10 +153,10 @@ def _told(
 ) -> Any:
     """Of recordings that begin at such a ``share`` of these loads, their lowest, and drift by as much."""
     monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(offsets))
-    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
+    monkeypatch.setattr(_zero, "_drift_at_rest", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
     sessions = [_session(share * np.linspace(one, 0.9, 101)) for one in begun[: len(offsets)]]
     sessions.append(_session(np.full(9, 0.01), np.zeros(9, dtype=bool)))
-    return _unseen(sessions, MODEL, left, remembered, STANDARD)
+    return _zero_by_model(sessions, MODEL, left, remembered, STANDARD)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -177,7 +177,7 @@ def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(
     assert zero.sd == pytest.approx(sd)
     assert (zero.value, zero.size) == (pytest.approx(sign * mean), pytest.approx(mean))
     assert (zero.effect.shifts, zero.alternatives) == ("reading", (shift_of("load").name,))
-    assert zero.led_from == 0.0
+    assert zero.extrapolated_from == 0.0
 
 
 def test_of_recordings_that_are_never_unloaded_those_tell_the_zero_that_come_nearest(
@@ -186,29 +186,36 @@ def test_of_recordings_that_are_never_unloaded_those_tell_the_zero_that_come_nea
     """One that begins at half of full scale, or is pressed from there on, hides nothing of one from next to none."""
     for shown in ([0.02], [0.02, 0.05], [0.02, -0.3]):
         (zero,) = _told(monkeypatch, shown, begun=(1e-4, 0.5))
-        assert (zero.value, zero.led_from) == (pytest.approx(0.02, abs=2e-3), 0.0)
+        assert (zero.value, zero.extrapolated_from) == (pytest.approx(0.02, abs=2e-3), 0.0)
         assert zero.sd < 0.005
 
 
 def test_a_zero_that_is_led_back_from_high_loads_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the unit does below them may make it: it is no cause."""
-    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.zeros(5))
+    monkeypatch.setattr(_zero, "_drift_at_rest", lambda one, model: np.zeros(5))
     still, load = replace(MODEL, relaxing_share=0.0), np.linspace(0.2, 0.9, 101)
     near, sd = MANY * STANDARD.zero_sd, MANY * math.hypot(STANDARD.zero_sd, 0.25 * 0.207)
-    for offset, led_from in ((0.999 * near, None), (1.001 * near, 0.207), (0.999 * sd, 0.207), (1.001 * sd, 0.0)):
+    for offset, extrapolated_from in (
+        (0.999 * near, None),
+        (1.001 * near, 0.207),
+        (0.999 * sd, 0.207),
+        (1.001 * sd, 0.0),
+    ):
         monkeypatch.setattr(_zero, "offsets", lambda *given, offset=offset: np.array([offset]))
-        found = _unseen([_session(load)], still, 0.0, 0.0, STANDARD)
-        assert [one.led_from for one in found] == ([] if led_from is None else [pytest.approx(led_from)])
+        found = _zero_by_model([_session(load)], still, 0.0, 0.0, STANDARD)
+        assert [one.extrapolated_from for one in found] == (
+            [] if extrapolated_from is None else [pytest.approx(extrapolated_from)]
+        )
 
 
 def test_an_unseen_zero_is_told_between_its_deviations_and_what_is_foreign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.zeros(5))
+    monkeypatch.setattr(_zero, "_drift_at_rest", lambda one, model: np.zeros(5))
     still = replace(MODEL, relaxing_share=0.0)
     session = _session(np.zeros(50))
 
     def told(offset: float) -> bool:
         monkeypatch.setattr(_zero, "offsets", lambda *given: np.array([offset]))
-        return bool(_unseen([session], still, 0.0, 0.0, STANDARD))
+        return bool(_zero_by_model([session], still, 0.0, 0.0, STANDARD))
 
     bound = MANY * STANDARD.zero_sd
     assert [told(by * bound) for by in (0.999, 1.001, -0.999, -1.001)] == [False, True, False, True]
@@ -239,12 +246,12 @@ def test_a_past_is_known_as_well_as_noise_lets_it() -> None:
     found = []
     for seed in range(60):
         noise = 2e-3 * np.random.default_rng(seed).standard_normal(600)
-        found.append(past_of(one, MODEL, noise + 0.3 + past * np.exp(-MODEL.pole_per_s * time_s)))
+        found.append(initial_memory_of(one, MODEL, noise + 0.3 + past * np.exp(-MODEL.pole_per_s * time_s)))
     values, sds = np.array(found).T
     assert np.mean(values) == pytest.approx(past, abs=3.0 * np.std(values) / np.sqrt(60.0) + 0.1 * past)
     assert np.median(sds) == pytest.approx(np.std(values), rel=0.35)
     one.reading = 0.3 + 0.01 * np.ones(600)
-    assert past_of(one, MODEL, np.full(600, 0.3))[0] == pytest.approx(0.0, abs=1e-6)
+    assert initial_memory_of(one, MODEL, np.full(600, 0.3))[0] == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -256,7 +263,7 @@ def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear_and_fades_t
     one = _rested(25)
     fading = np.exp(-MODEL.pole_per_s * one.conditions.time_s)
     one.reading = one.reading + faded * 0.1 * fading
-    monkeypatch.setattr(_zero, "past_of", lambda *given: (0.1, sd / MANY))
+    monkeypatch.setattr(_zero, "initial_memory_of", lambda *given: (0.1, sd / MANY))
     (rest,) = first_rests([one], MODEL, STANDARD)
     gone = 0.1 * float(np.mean(fading[:25])) if is_seen else 0.0
     read = float(np.mean(one.reading[:25]))
@@ -271,7 +278,7 @@ def test_a_past_that_begins_where_nothing_is_read_is_a_drift_and_no_offset(
     one = _rested(25)
     warmed = -0.016 * np.expm1(-MODEL.pole_per_s * one.conditions.time_s)
     one.reading = one.reading - 0.01 + stands_at + warmed
-    monkeypatch.setattr(_zero, "past_of", lambda *given: (-0.016, 1e-4))
+    monkeypatch.setattr(_zero, "initial_memory_of", lambda *given: (-0.016, 1e-4))
     found = zeros_of([one], MODEL, SCALE, 0.0, 0.0, STANDARD)
     assert [zero.effect.shifts for zero in found] == ["reading"] * is_named
 
@@ -364,7 +371,7 @@ def test_a_first_rest_at_a_tare_ends_where_the_load_leaves_it() -> None:
 
 def test_the_mean_of_a_rest_is_known_as_well_as_its_noise_and_the_samples_that_were_taken_of_it_let_it() -> None:
     one = _rested(16)
-    one.quiet, one.white_sd, one.thinned = SimpleNamespace(raw=0.01), 0.02, 4
+    one.denoised, one.white_sd, one.thinned = SimpleNamespace(raw_sd=0.01), 0.02, 4
     (rest,) = first_rests([one], MODEL, STANDARD)
     assert rest[4:] == pytest.approx([0.01 / 8.0, 0.02 / 0.8 / 8.0])
     one.fitted[:12] = False
@@ -375,7 +382,7 @@ def test_the_mean_of_a_rest_is_known_as_well_as_its_noise_and_the_samples_that_w
 def test_what_has_drifted_at_rest_is_taken_out_of_a_first_rest() -> None:
     drifting = MODEL.with_part("dead_band").with_part("zero_drift", np.array([0.002, 0.0, 60.0, 1.0]))
     one = _rested(25)
-    moved = _drifted(one, drifting)
+    moved = _drift_at_rest(one, drifting)
     expected = drifting.simulate(one.conditions) - drifting.without("zero_drift").simulate(one.conditions)
     assert moved == pytest.approx(expected)
     assert np.ptp(moved) > 0.0

@@ -56,11 +56,11 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     other = SimpleNamespace(effect=effect("dead_band"), size=0.25, name="dead_band")
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
-        can_validate=True, refused=(), undone=(), alone=None, screening=SCREENING,
-        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest=None,
+        can_validate=True, refused=(), cancelling_names=(), best_single=None, screening=SCREENING,
+        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest_law=None,
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
-    kinds[2].memory, kinds[2].size, kinds[2].wanders = "memory", 0.07, lambda lasts_s: ("wanders", lasts_s)
+    kinds[2].memory, kinds[2].size, kinds[2].sd_of_mean = "memory", 0.07, lambda lasts_s: ("wanders", lasts_s)
     made = SimpleNamespace(
         given=given,
         found=found,
@@ -70,7 +70,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         seen={},
         sizes={"linear_leak": 0.1, "delay": 0.3},
         not_undone=[],
-        as_calibrated=[],
+        limit_calibration_off=[],
         unproven=0.0,
         beyond=0.0,
         judged=1.0,
@@ -94,12 +94,12 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         return SimpleNamespace(name=name.name, size=made.sizes[name.name], rivals=(f"rival of {name.name}",))
 
     answer("prepared", given)
-    answer("inferred", found)
+    answer("infer_with_gas_check", found)
     answer("residual_of", lambda session, model: f"{getattr(session, 'name', session)} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
-    answer("repeating", lambda fine, left, thresholds: (fine, left))
+    answer("repeating_structure", lambda fine, left, thresholds: (fine, left))
     answer("names_of", lambda *_: tuple(made.names))
-    answer("other_kind_of", lambda name, *_: "it turned" if name.name == "turned" else None)
+    answer("reason_of_another_kind", lambda name, *_: "it turned" if name.name == "turned" else None)
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
     answer("fitted_rms", lambda *_: made.off)
@@ -108,22 +108,22 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("_with_offset", "with offset")
     answer("noise_kinds", ["noise"])
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
-    answer("wall_ratio_of", lambda *_: made.wall_ratio)
-    answer("not_undone_of", lambda *_: list(made.not_undone))
+    answer("limit_wall_ratio", lambda *_: made.wall_ratio)
+    answer("limit_not_undone", lambda *_: list(made.not_undone))
     answer("own_zeros", None)
     answer("mean_offset", 0.02)
     monkeypatch.setattr(_force, "mean_offset", lambda *_: 0.02)
-    answer("as_calibrated", lambda *_: list(made.as_calibrated))
+    answer("limit_calibration_off", lambda *_: list(made.limit_calibration_off))
     answer("compensation", lambda fine, model, *_: Compensation(fine, model, EXTENDED_N, PLAIN_N, EXTENDED_N, FILTER))
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
     answer("names_in", "names")
-    answer("not_explained_of", "left")
-    answer("off_elsewhere", 0.0)
+    answer("unexplained_remark", "left")
+    answer("held_out_excess", 0.0)
     answer("beyond_noise", lambda *_: made.beyond)
-    answer("left_where_judged", lambda *_: made.judged)
-    answer("not_shown_to_be_noise", lambda *_: made.unproven)
+    answer("held_out_rms", lambda *_: made.judged)
+    answer("untested_rms", lambda *_: made.unproven)
     answer("load_cycles", 9)
     return made
 
@@ -139,5 +139,11 @@ def run_diagnosis(parts: Any, thresholds: Thresholds = STANDARD) -> Any:
 def name_of(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, kind: float = 0.9) -> Any:
     known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
     return SimpleNamespace(
-        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind_probability=kind, by=None
+        name=name,
+        kind_only=kind_only,
+        is_sure=is_sure,
+        effect=known,
+        member=member,
+        kind_probability=kind,
+        law_in_place=None,
     )

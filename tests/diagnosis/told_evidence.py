@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
-from smartshoe.diagnosis._session import Quiet, Session
+from smartshoe.diagnosis._session import DenoisedLoad, Session
 from smartshoe.models.effects import Conditions
 from smartshoe.units import MILLIBAR
 
@@ -26,7 +26,7 @@ def candidate(name: str, slot: str = "", sign: float = 1.0, **of: Any) -> Any:
     made.__dict__.update(of)
     return SimpleNamespace(
         name=name, slot=slot or name, effect=made, columns=(1,), shape={},
-        has_sign_of=lambda strengths: bool(sign * float(strengths[0]) >= 0.0),
+        allows_sign_of=lambda strengths: bool(sign * float(strengths[0]) >= 0.0),
     )  # fmt: skip
 
 
@@ -36,7 +36,7 @@ class ToldEvidence:
     def __init__(
         self, candidates: list[Any], score: Callable[[tuple[int, ...]], float], inside: tuple[str, ...] = ()
     ) -> None:
-        self.given: Any = SimpleNamespace(candidates=candidates, model=SimpleNamespace(names=inside))
+        self.linearisation: Any = SimpleNamespace(candidates=candidates, model=SimpleNamespace(names=inside))
         self.thresholds, self.odds, self._score = STANDARD, 10.0, score
         self.strengths: dict[int, Array] = {}
         self.of_any_law = score  # where equations may depart towards their families' others
@@ -49,13 +49,13 @@ class ToldEvidence:
         score = self.of_any_law if of_any_law else self._score
         return Posterior(members, score(members), strengths, (1.0,) * count, (0.5,) * count, float(count))
 
-    def make_ready(self, members: set[int]) -> None:
+    def prepare_departures(self, members: set[int]) -> None:
         """Nothing is to be made before it is told."""
 
     def extensions(self, members: tuple[int, ...]) -> list[tuple[float, int, Array]]:
         return [
             (self._score(tuple(sorted((*members, k)))), k, self.strengths.get(k, np.ones(1)))
-            for k in range(len(self.given.candidates))
+            for k in range(len(self.linearisation.candidates))
             if k not in members
         ]
 
@@ -71,7 +71,7 @@ def session_of(load: Array, fitted: Any = None, cycle: Any = None, reading: Any 
     told: Any = SimpleNamespace(metadata={}, sensor=SimpleNamespace(unit=MILLIBAR))
     return Session(
         told, 0, at, load.copy() if reading is None else reading, np.ones(load.size, dtype=bool), ~kept,
-        np.zeros(load.size, dtype=np.intp) if cycle is None else cycle, load < 0.02, 1, Quiet(load, 0.0, 0.0),
+        np.zeros(load.size, dtype=np.intp) if cycle is None else cycle, load < 0.02, 1, DenoisedLoad(load, 0.0, 0.0),
     )  # fmt: skip
 
 
@@ -86,4 +86,4 @@ def told_fit(cost: float, *names: str, share: float = 0.1) -> Any:
 
 def taken_for_exact(evidence: Evidence, members: Members) -> Posterior:
     """The evidence of a set whose equations are taken for exact."""
-    return evidence._described(members, *evidence._solved(members, None))
+    return evidence._posterior_of(members, *evidence._set_solution(members, None))

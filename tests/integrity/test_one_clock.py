@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Thresholds, diagnose
-from smartshoe.diagnosis._aligned import _is_load_known, aligned, as_they_follow
+from smartshoe.diagnosis._aligned import _is_load_known, aligned, with_lags_removed
 from smartshoe.diagnosis._characteristic import friction_of
 from smartshoe.integrity import OneClock, _own_clocks, examine
 from smartshoe.integrity._clocks import UNSEEN, Lags, _correlation, _peak, one_clock
@@ -293,8 +293,8 @@ def test_what_is_late_by_a_quarter_of_its_period_is_no_friction(drift: float) ->
     )
     assert "its direction" in str(friction_of(swayed, STANDARD))
     whole = [swayed.sensor.present]
-    assert as_they_follow([swayed], whole, None) == [swayed]
-    (moved,) = as_they_follow([swayed], whole, OneClock(0.25, drift))
+    assert with_lags_removed([swayed], whole, None) == [swayed]
+    (moved,) = with_lags_removed([swayed], whole, OneClock(0.25, drift))
     assert friction_of(moved, STANDARD) is None
     assert np.max(np.abs(moved.sensor.values - 100.0 * load(time_s))[100:-100]) < 1.0
 
@@ -311,7 +311,7 @@ def test_what_relaxes_through_a_hold_is_not_turned_over_by_what_looks_like_a_lag
     ]
     whole = [run.sensor.present for run in runs]
     for lag_s in (8.0, 20.0, 40.0):
-        assert as_they_follow(runs, whole, OneClock(lag_s, 0.0)) == runs
+        assert with_lags_removed(runs, whole, OneClock(lag_s, 0.0)) == runs
     found = diagnose(runs[:2], hold_out=runs[2])
     assert found.baseline_model is not None
     assert found.baseline_model.full_scale_reading > 0.0

@@ -94,7 +94,7 @@ def test_what_is_said_of_a_cause_does_not_contradict_itself(
         effect=LEAK_CAUSE.effect, equivalents=tuple(equivalents), is_sure=is_sure, kind_only=kind_only,
         kind_probability=0.5, member=SimpleNamespace(fall=100.0),
     )  # fmt: skip
-    found: Any = SimpleNamespace(alone=None if alone is None else effect(alone))
+    found: Any = SimpleNamespace(best_single=None if alone is None else effect(alone))
     evidence = tuple(_how_sure(name, None, rivals, found, Thresholds()))
     cause = replace(LEAK_CAUSE, rivals=rivals, equivalents=name.equivalents, evidence=evidence)
     this_one = why_this_one(cause)
@@ -172,9 +172,9 @@ def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> Non
     assert heading(made) == "The simulation is wrong, and it is known why"
     doubted = replace(made, causes=(*made.causes, replace(made.causes[0], confidence=0.74)))
     assert heading(doubted).endswith("it is known what follows it, though not each cause is sure")
-    of_zeros = replace(made, extended=made.baseline)
-    assert heading(of_zeros) == "The simulation is good enough once the zero of the recordings is allowed for"
-    assert heading(replace(of_zeros, verdict="partly_explained")).startswith("The simulation is wrong")
+    zero_limits = replace(made, extended=made.baseline)
+    assert heading(zero_limits) == "The simulation is good enough once the zero of the recordings is allowed for"
+    assert heading(replace(zero_limits, verdict="partly_explained")).startswith("The simulation is wrong")
 
 
 @pytest.mark.parametrize("verdict", ["explained", "partly_explained"])
@@ -361,6 +361,6 @@ def test_what_was_gained_is_lower_higher_or_the_same() -> None:
     same = replace(made, extended=made.baseline)
     assert what_was_gained(same).endswith("so that the error stays as it is.")
     assert what_was_gained(replace(made, gain=None)) == added
-    nameless = replace(made, causes=(), minor=("delay",))
-    assert what_was_gained(nameless).startswith("Added: without a name: delay. It lowers")
-    assert what_was_gained(replace(nameless, minor=())) == "Nothing was added."
+    unnamed_rms = replace(made, causes=(), minor=("delay",))
+    assert what_was_gained(unnamed_rms).startswith("Added: without a name: delay. It lowers")
+    assert what_was_gained(replace(unnamed_rms, minor=())) == "Nothing was added."
