@@ -15,6 +15,7 @@ from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Cause, Ri
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import Zero
+from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import catalogue, in_words
 from smartshoe.models.effects.exposure import SAYS
@@ -62,13 +63,12 @@ def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
 def _fall_without_it(name: Name) -> Statement:
     """How much less probable the data is without the effect."""
     nothing = next((a.margin for a in name.member.alternatives if a.effect is None), 0.0)
-    return Statement(
-        "fall of -2 log evidence",
-        nothing,
-        0.0,
-        f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} (-2 log likelihood, 10 is strong"
-        " evidence), though other effects may take its place in part",
-    )
+    says = f"less likely by {nothing:,.0f} (-2 log likelihood, 10 is strong evidence), though other effects may take"
+    says += " its place in part"
+    if nothing < 0.0:
+        says = f"no less likely (-2 log likelihood falls by {-nothing:,.0f}), since other effects take its place"
+    says = f"without it, with all else fitted again, the data is {says}"
+    return Statement("fall of -2 log evidence", nothing, 0.0, says)
 
 
 def _nearest_rival(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> list[Statement]:
@@ -78,8 +78,10 @@ def _nearest_rival(rivals: Sequence[Rival], equivalents: Sequence[str] = ()) -> 
     nearest = rivals[0]
     exact = ", equations taken as exact" if nearest.by == "fit" else ""
     measure = f" (-2 log likelihood{exact})" if abs(nearest.margin) >= 0.5 else ""
-    beside = " beside what cannot be ruled out" if equivalents and nearest.effect not in equivalents else ""
-    says = f"{in_words(nearest.effect)}, the nearest other{beside}, {nearest.says}{measure}"
+    rival = "the nearest rival"
+    if equivalents and nearest.effect not in equivalents:
+        rival = "the nearest rival that is not an equivalent"
+    says = f"{in_words(nearest.effect)}, {rival}, {nearest.says}{measure}"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 
@@ -92,9 +94,9 @@ def _how_sure(
         why = (
             "by itself it predicts best what is left out"
             if does_most_alone
-            else "it is larger than all that is left, or than small imperfections and the laws beside it account for"
+            else "it is larger than all that is left, or than small imperfections and the errors of the laws beside it"
         )
-        doubt = "it may stand for what equations miss, or for a part of another cause"
+        doubt = "it may stand for the error of another equation, or for part of another cause"
         if name.equivalents or likelier_of(rivals, name.equivalents):
             doubt = "other effects do as well"
         says = f"it is not sure, since {doubt}; it is named because {why}"
@@ -103,12 +105,12 @@ def _how_sure(
         why = "no equation of its kind rules the others out"
         if not name.equivalents:
             nearest = in_words(name.effect.name)
-            why = f"{nearest} is by far the nearest, and misses more than equations do"
+            why = f"{nearest} is by far the nearest, but misses more than equations usually do"
             if law is not None and thresholds.clear * law.margin > name.member.fall:
-                why = f"none of its kind follows half of it, {nearest} comes nearest"
+                why = f"none of its kind follows half of it; {nearest} comes nearest"
         says = (
-            f"what it does to the reading is sure, by which law it does so is not: {why}, and it may be an effect that"
-            " the catalogue does not have"
+            f"what it does to the reading is sure, its law is not: {why}, and it may be an effect that the catalogue"
+            " does not have"
         )
         return [Statement(OF_A_KIND, name.kind_probability, thresholds.least_confidence, says)]
     return []
@@ -122,8 +124,8 @@ def _missed_by_law(law: Alternative | None, name: Name, thresholds: Thresholds) 
     most = 100 * thresholds.departure**2
     much = "no more" if missed <= most else "more"
     says = (
-        f"its equation misses {missed:.2g} % of the effect, {much} than equations do: the extended model keeps that"
-        " as a free form, the parameters are the equation's"
+        f"its equation misses {percent(0.01 * missed)} of the effect, {much} than equations usually do: the extended"
+        " model keeps the free form, and the parameters are the equation's"
     )
     return [Statement("share of its kind that the law misses in percent", missed, most, says)]
 
@@ -155,7 +157,7 @@ def _held_out_evidence(size: float, gained: Gain, material: float) -> list[State
             "gain on held-out data in percent",
             gained.gain_percent,
             0.0,
-            f"on data not fitted the error {way} from {gained.rmse_before:.4g} to {gained.rmse_after:.4g}"
+            f"on data that was not fitted the error {way} from {gained.rmse_before:.4g} to {gained.rmse_after:.4g}"
             f" {gained.unit}",
         ),
     ]

@@ -53,7 +53,7 @@ def limit_clocks_disagree(
         return None
     return (
         f"the reading is {_late(lag_s)} by the edges of load and reading, {_late(fitted_s)} beside the other"
-        " effects: one of them imitates the rest (record both by one clock)"
+        " effects: one of these imitates the difference (record both by one clock)"
     )
 
 
@@ -131,7 +131,7 @@ def reason_no_gas(name: Name, unit: Unit) -> str | None:
 def reason_clocks_aligned(name: Name) -> str:
     """Why a latency is no cause where readings were shifted to the load's clock before."""
     return _unnamed(
-        name, "readings were moved to the load's clock before, each by its own lag, of which it may be a rest"
+        name, "each reading was moved to the load's clock before, by its own lag, and this may be what is left of it"
     )
 
 
@@ -145,7 +145,7 @@ def limit_remembered(name: Name) -> str:
 
 def reason_few_cycles(name: Name, cycles: int) -> str:
     """Why an effect is no cause where there are as many surer ones as load cycles."""
-    said = _unnamed(name, f"so few load cycles ({cycles}) show no more than as many causes")
+    said = _unnamed(name, f"so few load cycles ({cycles}) cannot show more causes than there are cycles")
     return f"{said} (repeat the cycles)"
 
 
@@ -250,8 +250,8 @@ def limit_zero_drifted(zero: Zero, scale: Scale) -> str:
     """The sentence on an offset that may be a drift which began before the recordings."""
     value = zero.value * scale.reading
     return (
-        f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
-        " may have begun before, or there is an offset beside (record from where the unit is switched on)"
+        f"the zero is at {value:.3g} {scale.unit.symbol} where the recordings begin, and drifts that way: the drift may"
+        " have begun before, or there is an offset as well (record from where the unit is switched on)"
     )
 
 
@@ -260,19 +260,16 @@ def limit_zero_extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) ->
 
     If the unit is unloaded at some time, but not at the start, only its memory of earlier loads is unknown.
     """
-    stands = (
-        f"the reading stands at {zero.value * scale.reading:.3g} {scale.unit.symbol} ({percent(zero.size)} of full"
-        " scale): an offset, a tare, or what the unit"
-    )
+    value = f"{zero.value * scale.reading:.3g} {scale.unit.symbol} ({percent(zero.size)} of full scale)"
     if zero.extrapolated_from <= thresholds.standing:
         return (
-            f"without load {stands} remembers of loads before the recordings, of which this data shows nothing (record"
-            " a rest before the first load)"
+            f"without load the reading is {value}: an offset, a tare, or what the unit remembers of loads before the"
+            " recordings, which this data cannot tell apart (record a rest before the first load)"
         )
     return (
-        f"led back to no load from {percent(zero.extrapolated_from)} of it, {stands} does below such loads, or"
-        " remembers of those before, of which this data shows nothing (record a rest without load that the sensor can"
-        " read)"
+        f"extrapolated to no load from {percent(zero.extrapolated_from)} of full load, the reading is {value}: an"
+        " offset, a tare, what the unit does below such loads, or what it remembers of earlier ones, which this data"
+        " cannot tell apart (record a rest without load that the sensor can read)"
     )
 
 
@@ -319,7 +316,7 @@ def limit_own_gains(gains: Sequence[OwnGain]) -> list[str]:
     """The sentence on recordings with gains of their own."""
     if not gains:
         return []
-    told = "all else is told with this allowed for, and no model foresees the gain of another recording"
+    told = "all else is judged with this allowed for, and no model can predict the gain of another recording"
     if changes := changes_of(gains):
         return [f"the gain changes {_when(changes)}, as where a unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
@@ -342,7 +339,7 @@ def limit_own_zeros(zeros: OwnZeros | None, scale: Scale) -> list[str]:
         return f"{scale.zero + share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
 
     return [
-        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: that is allowed"
+        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: this is allowed"
         " for here (zero the load cell and the sensor before each)"
     ]
 
@@ -355,7 +352,7 @@ def limit_zero_jumps(changes: Sequence[ZeroChange]) -> list[str]:
         f"the zero jumps, in shares of full scale, {_when(changes)}, as where a unit slips, water moves in a line or"
         " the room warms:"
         " jumps that are not seen may imitate any effect of the unit, so that none is more than half sure, and no model"
-        " foresees those of another recording"
+        " can predict those of another recording"
     ]
 
 
@@ -372,9 +369,9 @@ def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
     effect, left, beside = found.nearest_law
     return [
         f"{in_words(effect.name)} alone follows most of what the baseline misses ({percent(left)} of full scale"
-        f" where it was fitted, {percent(beside)} with it), and so may small imperfections of many kinds,"
-        f" {percent(thresholds.imperfection)} each, so that it is not named: if this unit is better than that, ask"
-        f" for less than {percent(thresholds.material)} as material"
+        f" where it was fitted, {percent(beside)} with it), but so may small imperfections of many kinds,"
+        f" {percent(thresholds.imperfection)} each, so that it is not named: if this unit is better than that, set"
+        f" `material` to less than {percent(thresholds.material)}"
     ]
 
 
@@ -389,7 +386,7 @@ def limit_refusals(found: Inference) -> list[str]:
         )
     if found.refused:
         said.append(
-            f"tried and left out again: {listed(dict.fromkeys(found.refused))}: of no help in foreseeing recordings or"
-            " load cycles that were left out in turn, or too small there for what the held-out loads ask of them"
+            f"tried and not kept: {listed(dict.fromkeys(found.refused))} (of no help in predicting recordings or load"
+            " cycles that were left out in turn, or too small there to be trusted at the held-out loads)"
         )
     return said

@@ -62,7 +62,7 @@ def next_experiment(
     pair = _pair(causes)
     if worse:
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
-        says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
+        says = f"record loads like those of {held} again, and fit them too: the extended model does not hold for them"
         return NextExperiment(pair, "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.part is not None]
     proposed: list[NextExperiment] = []
@@ -76,8 +76,8 @@ def next_experiment(
         return NextExperiment(pair, "repeat", None, _what_to_repeat(found))
     if not found.can_validate:
         says = (
-            "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be"
-            " held against another, so that no cause can be told"
+            "repeat the load cycle, several times in one recording or in a second one: a single cycle cannot be checked"
+            " against another, so that no cause can be told"
         )
         return NextExperiment(pair, "repeat", None, says)
     least = excitation.thresholds.least_confidence
@@ -164,7 +164,7 @@ def _separating_experiment(
     says = f"run the protocol {in_words(protocol.name)}: it should tell {both} apart, which this data does not"
     if not _rules_out(then, thresholds):
         says = (
-            f"run the protocol {in_words(protocol.name)}: it should tell more of {both} than this data does, though,"
+            f"run the protocol {in_words(protocol.name)}: it should tell more about {both} than this data does, though,"
             f" {no_use}"
         )
     return NextExperiment(names, protocol.name, channel, says, then.margin - now.margin, protocol)
@@ -266,7 +266,9 @@ def _protocol_for_missing_excitation(
         lacking.sort(key=lambda word: word != "shuffled_loads")
     if lacking:
         name = SHOWN_BY[lacking[0]]
-        says = f"run the protocol {in_words(name)}: this data lacks {SAYS[lacking[0]]}, by which kinds differ"
+        says = (
+            f"run the protocol {in_words(name)}: this data lacks {SAYS[lacking[0]]}, which tell kinds of effects apart"
+        )
         steps = paced(EXPERIMENTS[name](peak_n), sample_time_s, excitation.thresholds)
         return NextExperiment(names, name, None, says, None, steps)
     says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"

@@ -116,9 +116,9 @@ def unexplained_remark(
     ``rest`` is structure without a cause, ``elsewhere`` the `held_out_excess`, ``unproven`` the `untested_rms`.
     """
     if unproven > max(rest.rms, elsewhere):
-        return f"{percent(unproven)} is left, of which nothing shows that it is noise"
+        return f"{percent(unproven)} is left, and nothing shows that this is noise"
     if elsewhere > rest.rms:
-        return f"of held-out data {percent(elsewhere)} is not explained"
+        return f"on held-out data {percent(elsewhere)} is not explained"
     if rest.rms <= thresholds.material:
         return None
     return f"over all recordings {percent(rest.rms)} {rest.how} and is not explained"
@@ -146,16 +146,16 @@ def sentence_of(
     left = "" if not_explained is None else f"; {not_explained}"
     by_all = percent(best.rmse)
     if verdict == "adequate":
-        return f"{good}{left}"
+        return f"{good}{left and f'{left}, no more than small imperfections of a good unit add up to'}"
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:
-        return f"{good}{left}: the extended model is good to {by_all}, by effects of which none is sure"
+        return f"{good}{left}: the extended model is good to {by_all}, with effects of which none is sure"
     if verdict == "unexplained":
         why = "no cause can be named from this data (see its limits)" if withheld else None
         return f"{good}{left}, and {why or 'no effect of the catalogue accounts for it'}"
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
     elif best.rmse == baseline.rmse:  # the causes are nothing that the baseline gets wrong
-        said = f"{good}, the recordings' own zeros allowed for; found in these: {named}"
+        said = f"{good}, with each recording's own zero allowed for; found in these zeros: {named}"
     elif worse or best.rmse > baseline.rmse:
         how = "worse" if worse else "no better"
         said = f"{good}; with {named} it is {how} there, good to {by_all}, and it stays as it is"

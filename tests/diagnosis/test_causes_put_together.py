@@ -50,7 +50,7 @@ def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts
     told = run_diagnosis(parts)
     assert ([one.name for one in told.causes], told.minor) == (["linear_leak"], ("delay",))
     (_, said) = told.limits
-    assert said.startswith("delay fits, but readings were moved to the load's clock before")
+    assert said.startswith("delay fits, but each reading was moved to the load's clock before")
 
 
 def test_of_two_effects_of_one_mechanism_the_surer_is_named_unless_the_other_is_no_departure(parts: Any) -> None:
@@ -87,8 +87,8 @@ def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest
         assert [one.name for one in told.causes] == named
         other = "linear leak" if sure > 0.9 else "delay"
         said = (
-            f"{other} fits, but so few load cycles (1) show no more than as many causes, so that it is not named"
-            " (repeat the cycles)"
+            f"{other} fits, but so few load cycles (1) cannot show more causes than there are cycles, so that it is"
+            " not named (repeat the cycles)"
         )
         assert (said in told.limits) is (cycles == 1)
 

@@ -351,7 +351,9 @@ def test_where_none_ends_the_doubt_the_shortest_that_tells_about_as_much_as_the_
         contest = _Foretold(*now, {"steps": steps, "rates": rates})
         told = _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest})
         assert (told.protocol, told.steps.name) == (protocol, protocol)
-        assert told.says.startswith(f"run the protocol {protocol}: it should tell more of {BOTH} than this data does")
+        assert told.says.startswith(
+            f"run the protocol {protocol}: it should tell more about {BOTH} than this data does"
+        )
         assert told.says.endswith(f"though, {NO_USE}; {LOADS}")
 
 

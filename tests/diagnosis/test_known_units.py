@@ -115,7 +115,7 @@ def test_one_load_cycle_of_a_strongly_curved_unit_is_unexplained_and_says_so(ram
     load = _course((0.0, 2.0), (1.0, ramp_s), (0.0, ramp_s), (0.0, 3.0), peak_n=PEAK_N)
     found = diagnose(_run(load, load - 0.008 * load**2, "once", 0.02, 1))
     assert (found.verdict, found.causes) == ("unexplained", ())
-    assert "% is left, of which nothing shows that it is noise, and no cause can be named from this data" in found.says
+    assert "% is left, and nothing shows that this is noise, and no cause can be named from this data" in found.says
     assert any("one load cycle of one recording: nothing in it is independent" in limit for limit in found.limits)
     assert found.leftover is not None
     assert found.explained_percent == 0.0
@@ -281,13 +281,13 @@ def test_a_zero_that_is_led_back_from_high_loads_is_told_and_one_from_no_load_is
     high = [run(0.2, "high"), run(0.25, "higher")]
     found = diagnose(high)
     assert (found.verdict, found.causes) == ("adequate", ())
-    (said,) = (one for one in found.limits if one.startswith("led back to no load from 2"))
-    assert "an offset, a tare, or what the unit does below" in said
+    (said,) = (one for one in found.limits if one.startswith("extrapolated to no load from 2"))
+    assert "an offset, a tare, what the unit does below" in said
     found = diagnose([*high, run(0.0, "from nothing")])
     (cause,) = found.causes
     assert {cause.name, *cause.equivalents} == {"zero_offset", "load_cell_tare"}
     assert cause.parameters["offset"].value == pytest.approx(2.5, rel=0.1)
-    assert not any(one.startswith("led back") for one in found.limits)
+    assert not any(one.startswith("extrapolated") for one in found.limits)
 
 
 @pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.bank) for seed in (22, 25))])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
-from smartshoe.diagnosis._causes import _held_out_evidence, _nearest_rival, cause_of, zero_cause_of
+from smartshoe.diagnosis._causes import _fall_without_it, _held_out_evidence, _nearest_rival, cause_of, zero_cause_of
 from smartshoe.diagnosis._diagnose import _pulled_reason, _refused
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, own_terms_of
@@ -171,10 +171,10 @@ def test_what_is_not_explained_is_the_larger_of_what_is_left_and_what_is_off_els
     for left in (_left(0.034), nothing):
         for unproven in (0.0, 0.19):
             said = unexplained_remark(left, 0.19, unproven, STANDARD)
-            assert said == "of held-out data 19 % is not explained"
+            assert said == "on held-out data 19 % is not explained"
         for elsewhere in (0.0, 0.19):
             said = unexplained_remark(left, elsewhere, 0.2, STANDARD)
-            assert said == "20 % is left, of which nothing shows that it is noise"
+            assert said == "20 % is left, and nothing shows that this is noise"
     slow = unexplained_remark(_left(0.034, how="changes slowly"), 0.0, 0.0, STANDARD)
     assert slow == "over all recordings 3.4 % changes slowly and is not explained"
     assert unexplained_remark(_left(STANDARD.material), 0.0, 0.0, STANDARD) is None
@@ -189,19 +189,20 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
     assert _said("explained", "dead_band", "delay", "rate_gain").endswith("to 10 % with dead band, delay and rate gain")
     rest = "over all recordings 3.4 % repeats and is not explained"
     assert _said("partly_explained", "delay") == f"{good}, and to 10 % with delay; {rest}"
-    unsure = "the extended model is good to 10 %, by effects of which none is sure"
+    unsure = "the extended model is good to 10 %, with effects of which none is sure"
     assert _said("unexplained") == f"{good}; {rest}: {unsure}"
     no_effect = "and no effect of the catalogue accounts for it"
     assert _said("unexplained", best=BEFORE) == f"{good}; {rest}, {no_effect}"
-    elsewhere = "of held-out data 19 % is not explained"
+    elsewhere = "on held-out data 19 % is not explained"
     assert _said("unexplained", best=BEFORE, elsewhere=0.19) == f"{good}; {elsewhere}, {no_effect}"
     no_cause = "and no cause can be named from this data (see its limits)"
-    unproven = "3.9 % is left, of which nothing shows that it is noise"
+    unproven = "3.9 % is left, and nothing shows that this is noise"
     said = _said("unexplained", best=BEFORE, unproven=0.039, withheld=True)
     assert said == f"{good}; {unproven}, {no_cause}"
     assert _said("unexplained", best=BEFORE, withheld=True) == f"{good}; {rest}, {no_cause}"
     assert _said("unexplained", withheld=True) == f"{good}; {rest}: {unsure}"
-    assert _said("adequate") == f"{good}; {rest}"
+    small = "no more than small imperfections of a good unit add up to"
+    assert _said("adequate") == f"{good}; {rest}, {small}"
     for quiet in (_left(STANDARD.material), _left(0.5, significant=False)):
         assert _said("adequate", left=quiet) == good
         assert _said("unexplained", left=quiet) == f"{good}: {unsure}"
@@ -221,7 +222,8 @@ def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged(
     explained = f"{unknown}; what is fitted is explained by delay"
     assert _said("explained", "delay", baseline=nothing, best=nothing) == explained
     assert _said("partly_explained", "delay", baseline=nothing, best=nothing) == f"{explained}; {rest}"
-    assert _said("adequate", baseline=nothing, best=nothing) == f"{unknown}; {rest}"
+    small = "no more than small imperfections of a good unit add up to"
+    assert _said("adequate", baseline=nothing, best=nothing) == f"{unknown}; {rest}, {small}"
 
 
 def test_what_was_taken_out_again_is_said_once() -> None:
@@ -230,15 +232,15 @@ def test_what_was_taken_out_again_is_said_once() -> None:
     found.refused = ("linear_leak", "delay", "linear_leak")
     (said,) = limit_refusals(found)
     assert said == (
-        "tried and left out again: linear leak, delay: of no help in foreseeing recordings or load cycles that were"
-        " left out in turn, or too small there for what the held-out loads ask of them"
+        "tried and not kept: linear leak, delay (of no help in predicting recordings or load cycles that were left out"
+        " in turn, or too small there to be trusted at the held-out loads)"
     )
     found.cancelling_names = ("rate_gain", "delay")
     undone = "these effects largely cancel one another, so that none is named: rate gain, delay"
     assert limit_refusals(found) == [undone, said]
     found.cancelling_names, found.refused = (), ("flexible_lag", "linear_leak")
     (said,) = limit_refusals(found)
-    assert said.startswith("tried and left out again: lag of free form, linear leak: of no help")
+    assert said.startswith("tried and not kept: lag of free form, linear leak (of no help")
     found.can_validate = False
     (said,) = limit_refusals(found)
     assert "no cause can be told" in said
@@ -327,16 +329,26 @@ def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monke
     fall, size, gained, rival = cause.evidence
     assert (fall.value, fall.threshold) == (55.0, 0.0)
     assert fall.says == (
-        "without it, all else fitted anew, the data is less likely by 55 (-2 log likelihood, 10 is strong evidence),"
-        " though other effects may take its place in part"
+        "without it, with all else fitted again, the data is less likely by 55 (-2 log likelihood, 10 is strong"
+        " evidence), though other effects may take its place in part"
     )
     assert (size.value, gained.value) == (pytest.approx(1.23), pytest.approx(50.0))
     assert (rival.value, rival.threshold) == (7.0, 0.0)
-    assert rival.says == f"orifice leak, the nearest other, fits worse by 7 {BY_FIT}"
+    assert rival.says == f"orifice leak, the nearest rival, fits worse by 7 {BY_FIT}"
     cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 95.0),))  # of another kind there is the evidence alone
     assert cause.rivals == (Rival("delay", 90.0, "evidence"), Rival("orifice_leak", 95.0, "fit"))
-    beside = "beside what cannot be ruled out"  # an orifice, by its fit
-    assert cause.evidence[-1].says == f"delay, the nearest other {beside}, is less likely by 90 (-2 log likelihood)"
+    rival_of = "the nearest rival that is not an equivalent"  # an orifice is, by its fit
+    assert cause.evidence[-1].says == f"delay, {rival_of}, is less likely by 90 (-2 log likelihood)"
+
+
+def test_a_cause_without_which_the_data_is_no_less_likely_is_said_to_be_so() -> None:
+    name: Any = SimpleNamespace(member=SimpleNamespace(alternatives=(SimpleNamespace(effect=None, margin=-12.0),)))
+    fall = _fall_without_it(name)
+    assert fall.value == -12.0
+    assert fall.says == (
+        "without it, with all else fitted again, the data is no less likely (-2 log likelihood falls by 12), since"
+        " other effects take its place"
+    )
 
 
 def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -353,21 +365,23 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.9, STANDARD.least_confidence)
     assert kind.says == (
-        "what it does to the reading is sure, by which law it does so is not: no equation of its kind rules the"
-        " others out, and it may be an effect that the catalogue does not have"
+        "what it does to the reading is sure, its law is not: no equation of its kind rules the others out, and it may"
+        " be an effect that the catalogue does not have"
     )
     alone = _told(monkeypatch, exposed, kind_only=True, equivalents=()).evidence[-1]
-    assert "by which law it does so is not: linear leak is by far the nearest, and misses more than" in alone.says
+    assert "its law is not: linear leak is by far the nearest, but misses more than" in alone.says
     # 200 of its 400 missed is half; beyond it a law follows nothing to speak of, at null at the worst.
     for missed, is_near in ((200.0, True), (201.0, False)):
         laws = (("linear_leak", missed),)
         said = _told(monkeypatch, exposed, kind_only=True, equivalents=(), laws=laws).evidence[-2].says
         assert ("linear leak is by far the nearest" in said) is is_near
-        assert ("none of its kind follows half of it, linear leak comes nearest" in said) is not is_near
+        assert ("none of its kind follows half of it; linear leak comes nearest" in said) is not is_near
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
     named = "it is not sure, since other effects do as well; it is named because"
-    size = f"{named} it is larger than all that is left, or than small imperfections and the laws beside it account for"
+    size = (
+        f"{named} it is larger than all that is left, or than small imperfections and the errors of the laws beside it"
+    )
     assert doubt.says == size
     for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another
         doubt = _told(monkeypatch, exposed, is_sure=False, alone=effect(alone)).evidence[-1]
@@ -381,8 +395,8 @@ def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch:
     told = cause.evidence[-1]
     assert (told.value, told.threshold) == (2.5, 100.0 * STANDARD.departure**2)
     assert told.says == (
-        "its equation misses 2.5 % of the effect, no more than equations do: the extended model keeps that as a free"
-        " form, the parameters are the equation's"
+        "its equation misses 2.5 % of the effect, no more than equations usually do: the extended model keeps the free"
+        " form, and the parameters are the equation's"
     )
 
 
@@ -399,8 +413,8 @@ def test_a_block_that_is_called_by_its_nearest_law_has_that_laws_parameters(
     (told,) = (one for one in cause.evidence if one.statistic.startswith("share of its kind"))
     assert (told.value, told.threshold) == (pytest.approx(margin / 4.0), 6.25)
     assert told.says == (
-        f"its equation misses {missed} % of the effect, {much} than equations do: the extended model keeps that as a"
-        " free form, the parameters are the equation's"
+        f"its equation misses {missed} % of the effect, {much} than equations usually do: the extended model keeps the"
+        " free form, and the parameters are the equation's"
     )
     assert "linear_leak" not in [one.effect for one in cause.rivals]
     # Of one that no law was fitted for, the block's own are told, and of no equation what it misses.
@@ -414,8 +428,8 @@ def test_no_rival_is_a_block_of_free_form(monkeypatch: pytest.MonkeyPatch) -> No
     near = (SimpleNamespace(effect="flexible_lag", margin=3.0), SimpleNamespace(effect="dead_band", margin=70.0))
     cause = _told(monkeypatch, exposed, laws=(("flexible_leak", 1.0),), alternatives=near)
     assert cause.rivals == (Rival("dead_band", 70.0, "evidence"), Rival("delay", 90.0, "evidence"))
-    beside = "beside what cannot be ruled out"  # an orifice, by its fit
-    assert cause.evidence[-1].says == f"dead band, the nearest other {beside}, is less likely by 70 (-2 log likelihood)"
+    rival_of = "the nearest rival that is not an equivalent"  # an orifice is, by its fit
+    assert cause.evidence[-1].says == f"dead band, {rival_of}, is less likely by 70 (-2 log likelihood)"
 
 
 @pytest.mark.parametrize(
@@ -432,12 +446,12 @@ def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelie
 ) -> None:
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", margin),))
     (rival,) = (one for one in cause.evidence if one.statistic == "margin to the nearest rival")
-    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, {said}")
+    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest rival, {said}")
     assert _nearest_rival(()) == []
     (far,) = _nearest_rival([Rival("delay", 278533.0, "evidence")])
-    assert far.says == "delay, the nearest other, is less likely by 278,533 (-2 log likelihood)"
+    assert far.says == "delay, the nearest rival, is less likely by 278,533 (-2 log likelihood)"
     (likelier,) = _nearest_rival([Rival("delay", -12.0, "evidence")])
-    assert likelier.says == "delay, the nearest other, is likelier by 12 (-2 log likelihood)"
+    assert likelier.says == "delay, the nearest rival, is likelier by 12 (-2 log likelihood)"
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])

@@ -260,10 +260,10 @@ def test_what_is_off_elsewhere_is_said_beside_what_was_fitted_and_the_loads_that
 
 def test_a_past_is_said_in_the_readings_unit() -> None:
     zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
-    assert "the zero stands at -7 mbar where the recordings begin" in limit_zero_drifted(
+    assert "the zero is at -7 mbar where the recordings begin" in limit_zero_drifted(
         zero, replace(SCALE, reading=140.0)
     )
-    assert "the zero stands at 7 mbar where" in limit_zero_drifted(zero, SCALE)  # it falls as the load grows
+    assert "the zero is at 7 mbar where" in limit_zero_drifted(zero, SCALE)  # it falls as the load grows
 
 
 def test_of_a_curve_beside_a_tare_the_range_is_told_that_its_parameters_are_of() -> None:
@@ -281,10 +281,10 @@ def test_a_zero_that_is_seen_later_on_is_led_back_from_no_load() -> None:
     """Of a unit that was unloaded between its loads nothing is unknown but what was before the recordings."""
     shift = shift_of("reading")
     for extrapolated_from, begins, asked in (
-        (0.019, "without load the reading stands at 7 mbar (5 %", "before the first load"),
+        (0.019, "without load the reading is 7 mbar (5 %", "before the first load"),
         (
             0.021,
-            "led back to no load from 2.1 % of it, the reading stands at 7 mbar (5 %",
+            "extrapolated to no load from 2.1 % of full load, the reading is 7 mbar (5 %",
             "without load that the sensor can read",
         ),
     ):
@@ -462,8 +462,8 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     (said,) = limit_own_gains(gains)
     assert said.startswith(
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
-        " d and 1 more, as where a unit slips: all else is told with this allowed for, and no model foresees"
-        " the gain of another recording"
+        " d and 1 more, as where a unit slips: all else is judged with this allowed for, and no model can"
+        " predict the gain of another recording"
     )
 
 

@@ -156,7 +156,8 @@ def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None
     assert told.steps is not None
     assert (told.steps.name, told.steps.peak_load_n) == (protocol, pytest.approx(800.0, rel=0.06))
     assert told.says == (
-        f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
+        f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, which tell kinds of"
+        " effects apart"
     )
     assert _protocol_for_missing_excitation(found, (), _lacking(), STEP_S).protocol == "repeat"
     # It shows what it is run for.

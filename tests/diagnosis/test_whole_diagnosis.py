@@ -265,7 +265,7 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     assert said(causes[:1], small)[1] == f"{good}, and to 1 % with dead band"
     rest = f"over all recordings {100 * large:.2g} % repeats and is not explained"
     assert said([], large) == (
-        "unexplained", f"{good}; {rest}: the extended model is good to 1 %, by effects of which none is sure"
+        "unexplained", f"{good}; {rest}: the extended model is good to 1 %, with effects of which none is sure"
     )  # fmt: skip
     assert said(causes[:2], large) == ("partly_explained", f"{good}, and to 1 % with dead band and delay; {rest}")
     # What laws usually depart by may be left, but not where no law of the kind follows.
@@ -276,7 +276,8 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     between = 0.5 * (limits.material + limits.tolerable)
     assert said([], between) == (
         "adequate",
-        f"{good}; over all recordings {100 * between:.2g} % repeats and is not explained",
+        f"{good}; over all recordings {100 * between:.2g} % repeats and is not explained, no more than small"
+        " imperfections of a good unit add up to",
     )
 
 
@@ -417,6 +418,6 @@ def test_what_the_baseline_leaves_open_is_not_said_to_be_mended() -> None:
     causes: Any = [SimpleNamespace(name="zero_offset", confidence=0.9)]
     both = Errors(np.array([1e-4]), np.array([1.0]), 1.0)
     assert sentence_of("explained", names_in(causes, 0), both, both, None, Thresholds()) == (
-        "the baseline simulation is good to 1 % of full scale on data it was not fitted to, the recordings' own"
-        " zeros allowed for; found in these: zero offset"
+        "the baseline simulation is good to 1 % of full scale on data it was not fitted to, with each"
+        " recording's own zero allowed for; found in these zeros: zero offset"
     )

@@ -256,13 +256,13 @@ def test_why_a_cause_is_not_sure_is_said_where_it_is_named(
     statistic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Once, and not among what is folded."""
-    why = "by which law it does so is not"
+    why = "its law is not sure"
     doubted = replace(LEAK_CAUSE, evidence=(*LEAK_CAUSE.evidence, Statement(statistic, 0.9, 0.75, why)))
     assert (LEAK_CAUSE.doubt, doubted.doubt) == ("", why)
     made = replace(case("one cause"), causes=(doubted,))
     text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
-    assert text.count("By which law it does so is not.") == 1
-    assert text.index("By which law it does so") < text.index("What speaks for it")
+    assert text.count("Its law is not sure.") == 1
+    assert text.index("Its law is not sure") < text.index("What speaks for it")
     monkeypatch.setenv("COLUMNS", "240")
     print_diagnosis(made)
     assert f"; {why}" in capsys.readouterr().out
