@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -56,3 +57,11 @@ def test_every_listed_bug_is_noticed_by_its_tests() -> None:
     print(done.stdout)
     assert "100 %" in done.stdout
     assert done.stderr == ""
+
+
+def test_each_equivalent_mutant_is_one_of_the_source() -> None:
+    """A line that is edited makes another mutant: then its entry goes, or is argued for anew."""
+    entries = re.findall(r"([\w/]+\.py): (`[^`]*` → `[^`]*`)", (HERE / "equivalent.md").read_text(encoding="utf-8"))
+    package = HERE.parent.parent / "smartshoe"
+    known = {file: {str(one) for one in changes((package / file).read_text("utf-8"))} for file, _ in entries}
+    assert [f"{file}: {shown}" for file, shown in entries if shown not in known[file]] == []
