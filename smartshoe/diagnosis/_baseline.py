@@ -19,8 +19,9 @@ from smartshoe.signals.lags import lagged
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # about the mean of the paper's four units (Table 1)
 _, SHARE, RATE = BASELINE
 MOST_OF_WALL = 5.0  # share; beyond it the static gain is six times the instant one, and the wall a dashpot
+FASTEST_PER_S = 50.0  # pole; a wall's arm is slower, a sensor's lag seldom faster
 # A resolution of the start. All halved or doubled, no name changed in two cases.
-POLES_PER_S = np.geomspace(RATE.lower, RATE.upper, 35)
+POLES_PER_S = np.geomspace(RATE.lower, FASTEST_PER_S, 35)
 WALL_RATIOS = 1.02, 50.0  # bounds for any tube
 
 
@@ -59,7 +60,7 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
         fast, slow = np.linalg.solve(part, gram[1:, 0])
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
         share = float(slow / fast) if fast != 0.0 else SHARE.upper
-        # Within the bounds of both, since a fit starts there: beyond them it would be another solid than this one.
+        # Within the bounds of share and rate, since a fit starts there: beyond them it would be another solid.
         lowest, highest = max(SHARE.lower, RATE.lower / pole - 1.0), min(SHARE.upper, RATE.upper / pole - 1.0)
         shares = (share,) if lowest <= share <= highest else (lowest, highest)
         for share in shares:
@@ -86,7 +87,7 @@ def has_arm_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
 def has_extreme_arm(model: ExtendedModel) -> bool:
     """Whether no wall has such an arm: it follows an effect, or another kind of sensor."""
     share, rate = model.relaxing_share, model.relaxation_rate_per_s
-    return not (SHARE.lower < share < MOST_OF_WALL and RATE.lower < rate < RATE.upper)
+    return not (SHARE.lower < share < MOST_OF_WALL and RATE.lower < rate < FASTEST_PER_S)
 
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:

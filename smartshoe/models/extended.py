@@ -24,7 +24,8 @@ from smartshoe.models.elements import Arm, Element
 BASELINE = (
     EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),
     EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, -0.9, 50.0, 0.1),
-    EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
+    # The pole is the rate over 1 + share, so that this bound leaves a sensor that only lags its pole of 50/s.
+    EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 2550.0, 0.2),
 )
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 

@@ -31,6 +31,7 @@ from smartshoe.diagnosis._sensitivity import (
 from smartshoe.diagnosis._session import prepare
 from smartshoe.integrity import examine
 from smartshoe.models.core import USUAL_WALL_RATIO
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import VOLT
 
 Array = NDArray[np.float64]
@@ -89,6 +90,33 @@ def test_a_fit_begins_at_the_solid_that_was_weighed_also_where_the_reading_is_la
         one.reading = lagged(lagged(one.conditions.load, STEP_S, 0.5 * lag_s), STEP_S, 0.5 * lag_s)
     found = baseline_of(sessions, SCALE)
     assert within_bounds(found).theta == pytest.approx(found.theta, rel=1e-12)
+
+
+@pytest.mark.parametrize("lag_s", [0.1, 0.3, 1.0])
+def test_a_sensor_that_only_lags_is_followed_as_closely_as_by_least_squares(lag_s: float) -> None:
+    """Up to 98 % may relax, whatever the pole, so that none of the grid's poles is better at any share."""
+    sessions = sessions_under(MODEL)
+    for one in sessions:
+        one.reading = lagged(lagged(one.conditions.load, STEP_S, 0.5 * lag_s), STEP_S, 0.5 * lag_s)
+    found = baseline_of(sessions, SCALE)
+    for pole in POLES_PER_S[10:]:
+        for share in (0.5, 5.0, 20.0, SHARE.upper):
+            other = replace(MODEL, relaxing_share=share, relaxation_rate_per_s=float(pole) * (1.0 + share))
+            assert _squares(found, sessions) <= 1.001 * _squares(other, sessions)
+
+
+def _squares(model: ExtendedModel, sessions: list[Any]) -> float:
+    """Of what a solid leaves of all sessions at its best gain, each session's offset and past taken off."""
+    share, pole = model.relaxing_share, model.pole_per_s
+    parts = np.zeros((2, 2))
+    for one in sessions:
+        load, time_s = one.conditions.load, one.conditions.time_s - one.conditions.time_s[0]
+        made = (load + share * lagged(load, STEP_S, 1.0 / pole)) / (1.0 + share)
+        own = np.column_stack([np.ones(load.size), np.exp(-pole * time_s)])
+        both = np.column_stack([one.reading, made])
+        both = both - own @ np.linalg.lstsq(own, both)[0]
+        parts += both.T @ both
+    return float(parts[0, 0] - parts[0, 1] ** 2 / parts[1, 1])
 
 
 def test_a_unit_that_is_slower_than_its_load_is_not_turned_over() -> None:
