@@ -58,8 +58,8 @@ class Compensation:
 
     @cached_property
     def undone(self) -> ExtendedModel:
-        """The part of ``model`` that a filter of readings inverts."""
-        return self.model.without(*self.filter.not_inverted)
+        """The part of ``model`` that a filter of readings inverts, and what clips: beside these a zero is taken."""
+        return _beside_zero(self.model, self.filter)
 
     @cached_property
     def zero(self) -> float:
@@ -116,12 +116,18 @@ def compensation(
 
 
 def _without_clipped(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Session:
-    """``session`` without samples that ``model`` clips by more than is tolerable, since their reading gives no load."""
-    whole, usable = model.simulate(session.conditions), session.usable
-    for part in model.parts:
-        if part.effect.clips:
-            lost = whole - model.without(part.name).simulate(session.conditions)
-            usable = usable & (np.abs(lost) < thresholds.tolerable)
+    """``session`` without samples that ``model`` clips, since their reading tells no load.
+
+    There it moves the reading by more than is tolerable, and more than half of the slope is lost. What is moved where
+    most of the slope is left is a bend: it tells a load, and its error counts.
+    """
+    usable = session.usable
+    whole, entering = model.trace(session.conditions)
+    for part, signal in zip(model.chain, entering, strict=False):  # the last is what leaves the chain
+        if part is not None and part.effect.clips:
+            moved = np.abs(whole - model.without(part.name).simulate(session.conditions)) >= thresholds.tolerable
+            is_flat = thresholds.clear * part.effect.slope_left(signal, part.values) < 1.0
+            usable = usable & ~(moved & is_flat)
     return replace(session, usable=usable)
 
 
@@ -226,13 +232,22 @@ def _force_error_n(session: Session, model: ExtendedModel) -> Array:
     """
     started_s = session.conditions.before.get("time_s", 0.0)
     compensator = _compensator(model, session, started_s)
-    undone = model.without(*compensator.not_inverted)  # the offset takes the constant part of what is not undone
+    undone = _beside_zero(model, compensator)
     read = undone.simulate(session.conditions)
     _, own = own_terms_of(session, undone, session.reading - read)
     if session.conditions.before:
         rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
         own = own + read - undone.simulate(rested)
     return _error_without_own_n(session, model, compensator, own)
+
+
+def _beside_zero(model: ExtendedModel, compensator: ExtendedCompensator) -> ExtendedModel:
+    """The part of ``model`` beside which a zero is taken: what the compensator undoes, and what clips.
+
+    So the zero takes the constant part of what else is not undone. What bends at one end of the range has none.
+    """
+    left = (part for part in model.parts if part.name in compensator.not_inverted)
+    return model.without(*(part.name for part in left if not part.effect.clips))
 
 
 def _compensator(model: ExtendedModel, session: Session, started_s: float = 0.0) -> ExtendedCompensator:

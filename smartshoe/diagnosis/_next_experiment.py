@@ -150,7 +150,8 @@ def _separating_experiment(
     channel = None if word is None else in_words(word)
     if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
         most = max((then.margin - now.margin for _, then in predicted), default=0.0)
-        lost = [name for name in (cause.name, rival) if effect(name).why_not_undone]
+        fits = ((cause.name, now.cause), (rival, now.rival))
+        lost = [name for name, one in fits if _is_never_undone(name, one, least_s)]
         instead = "use either for loads like those recorded, under which they read too nearly alike"
         if len(lost) == 1:
             why = effect(lost[0]).why_not_undone
@@ -168,6 +169,13 @@ def _separating_experiment(
             f" {no_use}"
         )
     return NextExperiment(names, protocol.name, channel, says, then.margin - now.margin, protocol)
+
+
+def _is_never_undone(name: str, fitted: Fit, step_s: float) -> bool:
+    """Whether an effect has no inverse on a stream at the values of a fit."""
+    if not effect(name).why_not_undone:
+        return False
+    return effect(name).inverse(fitted.model.part(name).values, step_s) is None
 
 
 def _least_step_s(sessions: Sequence[Session]) -> float:

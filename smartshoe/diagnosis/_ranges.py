@@ -94,7 +94,8 @@ def _limit_flat_reading(pairs: Sequence[tuple[Array, Array]], scale: Scale, thre
     """The sentence on a reading that stands still over the upper loads, as at a mechanical stop.
 
     In the recording of the highest load, medians of the reading over the upper share `same` of its loads, or more,
-    differ from the last by less than `standing` of its span.
+    differ from the last by less than `standing` of its span. How far the loads reach goes by medians too, since the
+    very highest may be few samples, which the median of a reading that follows does not show either.
     """
     load, reading = max(pairs, key=lambda one: float(one[0].max()))
     order = np.argsort(load)
@@ -102,8 +103,8 @@ def _limit_flat_reading(pairs: Sequence[tuple[Array, Array]], scale: Scale, thre
     levels = np.array([float(np.median(reading[group])) for group in groups])
     moves = np.abs(levels - levels[-1]) >= thresholds.standing * float(np.ptp(reading))
     first = int(np.flatnonzero(moves)[-1]) + 1 if moves.any() else 0
-    begins = float(np.median(load[groups[first]]))
-    if float(load.max()) - begins < thresholds.same * float(np.ptp(load)) or first + 1 >= len(groups):
+    begins, ends = (float(np.median(load[groups[k]])) for k in (first, -1))
+    if ends - begins < thresholds.same * float(np.ptp(load)) or first + 1 >= len(groups):
         return []
     return [
         f"above {rounded(begins * scale.load_n)} N the reading stands still, to {100.0 * thresholds.standing:g} % of"

@@ -206,7 +206,6 @@ def test_drifts_go_on_from_the_time_that_a_unit_has_been_on(seed: int, on_s: flo
     [
         ("delay", "cannot be moved to another time"),
         ("clock_drift", "cannot be moved to another time"),
-        ("saturation", "clipped"),
         ("cross_talk", "neighbour"),
         ("coloured_noise", "noise"),
         ("hum", "noise"),
@@ -220,6 +219,15 @@ def test_what_cannot_be_undone_is_passed_over_and_said(name: str, why: str) -> N
     assert list(filter_.not_inverted) == [name]
     readings = np.linspace(0.0, 100.0, 50)
     assert np.array_equal(filter_.apply(readings), ExtendedCompensator(model.without(name), 100.0).apply(readings))
+
+
+@pytest.mark.parametrize(("lost", "is_undone"), [(0.1, True), (0.5, True), (0.51, False), (1.0, False)])
+def test_what_is_clipped_stays_and_what_is_bent_is_undone(lost: float, is_undone: bool) -> None:
+    model = BASELINE.with_part("saturation", [lost, 0.6, 0.01, 0.0])
+    filter_ = ExtendedCompensator(model, 100.0)
+    assert dict(filter_.not_inverted) == ({} if is_undone else {"saturation": "what was clipped is lost"})
+    off = np.max(np.abs(_error(model, some_conditions(7))))
+    assert off < EXACT_TOLERANCE if is_undone else off > 0.05
 
 
 def test_a_drift_with_the_temperature_is_passed_over_and_said() -> None:

@@ -67,7 +67,7 @@ def test_drawn_chains_in_c_are_the_filters(names: list[str], seed: int, hz: floa
 
 @needs_compiler
 @given(
-    names=st.lists(st.sampled_from([*INVERTIBLE, "delay", "saturation"]), max_size=3, unique=True),
+    names=st.lists(st.sampled_from([*INVERTIBLE, "delay"]), max_size=3, unique=True),
     seed=st.integers(0, 1000), text=st.text(max_size=10),
 )  # fmt: skip
 @settings(max_examples=6, deadline=None)
@@ -76,6 +76,14 @@ def test_the_self_test_passes_for_any_chain_and_name(names: list[str], seed: int
         write_files(export_files(extended_calibration(chain_of(names, seed), unit=text + "*//"), "c"), name)
         done = _self_test(Path(name))
     assert done.returncode == 0, done.stdout
+
+
+@needs_compiler
+@pytest.mark.parametrize("rail", [0.5, 1.0])
+@pytest.mark.parametrize("knee", [1e-3, 0.08])
+def test_a_bend_at_the_end_of_the_range_is_undone_in_c(knee: float, rail: float) -> None:
+    model = chain_of([], 1).with_part("saturation", [0.5, 0.55, knee, rail])
+    assert _differs(extended_calibration(model), _readings(model, 5)) <= 1e-12
 
 
 @needs_compiler

@@ -243,9 +243,16 @@ def _cause(
 class _Foretold:
     """A contest of this data, with what each protocol would make of it: log odds and margin."""
 
-    def __init__(self, log_odds: float, margin: float, then: dict[str, tuple[float, float]] | None = None) -> None:
+    def __init__(
+        self,
+        log_odds: float,
+        margin: float,
+        then: dict[str, tuple[float, float]] | None = None,
+        fits: tuple[ExtendedModel, ExtendedModel] = (MODEL, MODEL),
+    ) -> None:
         self.log_odds, self.margin, self._then = log_odds, margin, then or {}
-        self.cause = SimpleNamespace(likelihood=SimpleNamespace(sessions=()))
+        self.cause = SimpleNamespace(likelihood=SimpleNamespace(sessions=()), model=fits[0])
+        self.rival = SimpleNamespace(model=fits[1])
         self.asked: list[str] = []
 
     def after_experiment(
@@ -364,8 +371,12 @@ def test_what_no_protocol_tells_better_asks_for_a_channel_or_for_nothing(monkeyp
     # Nothing is said of what would be read if it were the other one, which nobody simulated.
     assert told.says == f"{NO_USE}: use either for loads like those recorded, under which they read too nearly alike"
     clip = _cause("sensor_nonlinearity", 0.3, ("saturation",), ())
-    told = _next(monkeypatch, [clip], {"sensor_nonlinearity": contests["linear_leak"]})
-    assert told.says.endswith("nearly alike, but the saturation stays in the force, since what was clipped is lost")
+    for slope_lost, stays in ((1.0, True), (0.1, False)):  # a bend is undone as another curve is
+        fits = MODEL, MODEL.with_part("saturation", [slope_lost, 0.8, 0.01, 0.0])
+        unlike = _Foretold(0.1, 5.0, {"steps": (0.199, 90.0), "rates": (0.1, 40.0)}, fits)
+        said = _next(monkeypatch, [clip], {"sensor_nonlinearity": unlike}).says
+        lost = "nearly alike, but the saturation stays in the force, since what was clipped is lost"
+        assert said.endswith(lost if stays else "under which they read too nearly alike")
     told = _next(monkeypatch, [_cause(*LEAK)], contests, channel="pressure_reference")
     assert (told.protocol, told.channel) == (None, "pressure reference")
     assert told.says == f"{NO_USE}: what would is {SAYS['pressure_reference']}"

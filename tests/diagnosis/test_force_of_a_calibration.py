@@ -30,6 +30,7 @@ from smartshoe.diagnosis._procedure import _with_held_drifts
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import mean_offset
 from smartshoe.models.effects import effect
+from smartshoe.models.effects.saturation import MOST_LOST
 from smartshoe.models.extended import ExtendedModel
 
 STANDARD = Thresholds()
@@ -118,9 +119,38 @@ def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
     lost_share = np.mean(np.abs(MODEL.simulate(one.conditions) - seen.reading) >= STANDARD.tolerable)
     assert said.startswith(f"errors of the force leave out {100.0 * lost_share:.2g} % of samples")
     assert limit_clipped(compensation([one], MODEL, MODEL, STANDARD)) == []
-    # Nor do they move the zero: the filter does not undo the clipping, and with them it lies below.
+    # Nor do they move the zero, though the filter does not undo the clipping: without it the zero lies below.
     assert found.zero == pytest.approx(0.0, abs=1e-4)
-    assert mean_offset([seen], found.undone) < -0.01
+    assert mean_offset([seen], found.model.without("saturation")) < -0.01
+
+
+@pytest.mark.parametrize("lost", [0.1, MOST_LOST])
+def test_a_bend_tells_a_load_and_is_undone(one: Session, lost: float) -> None:
+    """Nothing is left out for it, and nothing said to be lost."""
+    bent = MODEL.with_part("saturation", [lost, 0.6, 0.01, 0.0])
+    seen = replace(one, reading=bent.simulate(one.conditions))
+    found = compensation([seen], bent, MODEL, STANDARD)
+    assert (found.clipped, found.is_plain, limit_clipped(found)) == (0.0, False, [])
+    assert limit_not_undone(found.model, one.conditions.step_s) == []
+    assert found.error.fitted_n < 1e-3 * 800.0 < found.before.fitted_n
+
+
+def test_what_is_moved_where_most_of_the_slope_is_left_counts(one: Session) -> None:
+    """The foot of a wide knee, though all above it is clipped and nothing undone; nor does it move the zero."""
+    clipped = MODEL.with_part("saturation", [1.0, 0.6, 0.05, 0.0])
+    seen = replace(one, reading=clipped.simulate(one.conditions))
+    found = compensation([seen], clipped, MODEL, STANDARD)
+    straight = MODEL.simulate(one.conditions)
+    moved = np.abs(straight - seen.reading) >= STANDARD.tolerable
+    assert found.clipped == pytest.approx(np.mean(straight > 0.6), abs=2e-3)
+    assert found.clipped < np.mean(moved) - 0.05
+    assert found.whole.fitted_n > STANDARD.tolerable * 800.0
+    assert found.zero == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_reading_is_clipped_where_its_effect_has_no_inverse() -> None:
+    """The share of the slope is one number, in the model as in the record."""
+    assert MOST_LOST * STANDARD.clear == 1.0
 
 
 @pytest.mark.parametrize(("more", "is_plain"), [(0.999, False), (1.001, True), (np.nan, True)])

@@ -222,6 +222,16 @@ def test_a_reading_that_stands_still_over_a_quarter_of_the_loads_or_more_is_told
         assert begins_n == pytest.approx(800.0 * stops_at, abs=30.0)
 
 
+def test_a_few_samples_of_a_peak_are_no_range_over_which_a_reading_stands_still() -> None:
+    """A linear unit behind a lag of 0.1 s: most of its upper loads are one hold, far below the peak."""
+    load = np.interp(TIME_S, [0.0, 5.0, 15.0, 19.9, 20.0, 20.1, 25.0], [0.0, 460.0, 460.0, 460.0, 800.0, 460.0, 460.0])
+    lagged, share = np.zeros(load.size), 1.0 - np.exp(-0.02 / 0.1)
+    for k in range(1, load.size):
+        lagged[k] = lagged[k - 1] + share * (load[k] - lagged[k - 1])
+    assert _ranges((load, GAIN_MBAR_PER_N * lagged)) == Ranges()
+    assert _ranges((load, GAIN_MBAR_PER_N * load)) == Ranges()
+
+
 def test_a_reading_that_bends_does_not_stand_still() -> None:
     load, _ = _proportional(0.0, 800.0)
     assert _ranges((load, 7.0 * np.sqrt(load))) == Ranges()

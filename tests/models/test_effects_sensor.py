@@ -17,6 +17,7 @@ from hypothesis.extra.numpy import arrays
 
 from smartshoe.models.effects import Conditions, Effect, Inverse, effect
 from smartshoe.models.effects.hum import _over_floor
+from smartshoe.models.effects.saturation import MOST_LOST
 from smartshoe.models.extended import ExtendedModel
 
 STEP_S = 0.02
@@ -30,6 +31,7 @@ DATA = (
 )  # fmt: skip
 INVERTED = (
     "sensor_nonlinearity", "gain_drift", "sensor_lag", "zero_offset", "zero_drift", "warm_up", "load_cell_tare", "hum",
+    "saturation",
 )  # fmt: skip
 MEMORYLESS = tuple(name for name in INVERTED if name != "sensor_lag")
 
@@ -366,6 +368,48 @@ def test_an_inverse_recovers_the_input_however_the_stream_is_cut(
         assert np.max(np.abs(whole - signal)) < 1e-12
 
 
+@settings(max_examples=200, deadline=None)
+@given(
+    signal=arrays(float, st.integers(1, 60), elements=st.floats(-0.5, 3.0)), lost=st.floats(0.0, MOST_LOST),
+    level=st.floats(0.55, 1.5), knee=st.floats(1e-3, 0.08), rail=st.floats(0.0, 1.0), cut=st.integers(0, 60),
+)  # fmt: skip
+def test_a_bend_that_leaves_half_of_the_slope_is_undone(
+    signal: np.ndarray, lost: float, level: float, knee: float, rail: float, cut: int
+) -> None:
+    """Below zero too, where the rail leaves as much; else what is read there stays as it is."""
+    one, values, conditions = effect("saturation"), np.array([lost, level, knee, rail]), _conditions(signal.size)
+    inverse = one.inverse(values, STEP_S)
+    if lost == 0.0 and rail > MOST_LOST:
+        assert inverse is None
+        return
+    assert inverse is not None
+    read = one.apply(signal, conditions, values)
+    whole = inverse.push(read, conditions.time_s)
+    assert np.array_equal(_pushed(inverse, read, conditions.time_s, [cut]), whole)
+    expected = np.where(read < 0.0, read, signal) if rail > MOST_LOST else signal
+    assert np.max(np.abs(whole - expected)) < 1e-12
+
+
+@pytest.mark.parametrize("lost", [np.nextafter(MOST_LOST, 1.0), 0.9, 1.0])
+def test_a_reading_that_loses_more_than_half_of_its_slope_is_lost(lost: float) -> None:
+    assert effect("saturation").inverse(np.array([lost, 0.8, 0.01, 0.0]), STEP_S) is None
+
+
+@given(
+    lost=st.floats(0.0, 1.0), level=st.floats(0.55, 1.5), knee=st.floats(1e-3, 0.08), rail=st.floats(0.0, 1.0),
+)  # fmt: skip
+def test_the_slope_left_is_that_of_the_curve(lost: float, level: float, knee: float, rail: float) -> None:
+    one, values, step = effect("saturation"), np.array([lost, level, knee, rail]), 1e-7
+    signal = np.linspace(-0.0102, 2.0, 500)  # 0 and the rail's corner lie between
+    ends = [one.apply(signal + by, _conditions(signal.size), values) for by in (step, -step)]
+    slope = (ends[0] - ends[1]) / (2.0 * step)
+    assert np.max(np.abs(one.slope_left(signal, values) - slope)) < 1e-3
+
+
+def test_an_effect_that_clips_and_says_no_more_leaves_no_slope() -> None:
+    assert not effect("delay").slope_left(np.ones(3), np.array([0.1])).any()
+
+
 def test_the_inverse_of_a_lag_is_right_to_first_order_of_the_step() -> None:
     one, values, errors = effect("sensor_lag"), np.array([0.2, 0.2]), []
     for step_s in (0.02, 0.01, 0.005):
@@ -390,7 +434,7 @@ def test_c_gives_the_numbers_of_push(tmp_path: Path) -> None:
     inverses: dict[str, Inverse] = {}
     for name in INVERTED:
         one = effect(name)
-        values = -_strong(one) if name != "sensor_lag" else _strong(one)
+        values = _strong(one) if name in ("sensor_lag", "saturation") else -_strong(one)
         values = np.array([abs(v) if p.null is None else v for v, p in zip(values, one.parameters, strict=True)])
         if name in ("gain_drift", "zero_drift"):
             values[1] = 0.0
@@ -406,10 +450,10 @@ def test_c_gives_the_numbers_of_push(tmp_path: Path) -> None:
         source += [
             f"void {name}(double *values, const double *times, long n);",
             f"void {name}(double *values, const double *times, long n)\n{{",
-            "    filter state, *f = &state;\n    long k;",
+            "    filter state, *f = &state;\n    long at;",
             f"    (void)f;\n    (void)times;\n   {starts}",
-            "    for (k = 0; k < n; k++) {\n        double x = values[k];\n        const double t = times[k];",
-            "        (void)t;\n" + step.body + "\n        values[k] = x;\n    }\n}",
+            "    for (at = 0; at < n; at++) {\n        double x = values[at];\n        const double t = times[at];",
+            "        (void)t;\n" + step.body + "\n        values[at] = x;\n    }\n}",
         ]
     (tmp_path / "inverses.c").write_text("\n".join(source) + "\n")
     flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]

@@ -198,8 +198,8 @@ class Effect(ABC):
     ``is_drift``: True where it goes on with the time since the session began, whatever the load; on a stream it is
     undone by a `Memoryless` inverse, if at all.
     ``is_leak``: True where air leaves the tube, so that an inverse sums up from the readings what has left.
-    ``clips``: True where a reading that it changes no longer tells the load.
-    ``why_not_undone``: half a sentence for a physical effect without an inverse.
+    ``clips``: True where it may leave so little slope (`slope_left`) that a reading no longer tells the load.
+    ``why_not_undone``: half a sentence for a physical effect without an inverse, or for values at which it has none.
     ``is_flexible``: True for a block that follows any member of its family; it is never named as a cause.
     ``is_refinement``: True where such a block follows members of other families too, so that it tells no kind.
     ``why_unnamed``: of a block that follows what no law of the catalogue does, what the reading then does.
@@ -257,6 +257,10 @@ class Effect(ABC):
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse | None:
         """`inverse` for a place in a ``chain``: for effects that bend beside its arm or remember reversals."""
         return self.inverse(values, step_s)
+
+    def slope_left(self, signal: Array, values: Array) -> Array:
+        """(n,) slope of the output over the input ``signal`` (n,) of an effect that ``clips``; 0 where it says none."""
+        return np.zeros_like(signal)
 
     @property
     def kind(self) -> str:
