@@ -38,7 +38,7 @@ from smartshoe.diagnosis._limits import (
     limit_zero_jumps,
 )
 from smartshoe.diagnosis._next_experiment import next_experiment
-from smartshoe.diagnosis._noise_kinds import noise_kinds
+from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import loads_beyond_fit
@@ -47,6 +47,7 @@ from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, 
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import Progress
+from smartshoe.diagnosis._told_lines import as_thinned, lines_of, told_tones
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
     fault_rms,
@@ -79,15 +80,16 @@ def diagnosed(
     sessions, fine, scale = given.sessions, given.fine, given.scale
     found = infer_with_gas_check(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
-    structures = _structures_of(found, given, integrity.faults)
+    noise = noise_without_memory(given.fine, found.fit.model, integrity.faults, thresholds.material)
+    structures = _structures_of(found, given, integrity.faults, noise)
     named = _named_causes(found, given, structures)
     with_drifts_held = _with_held_drifts(found.fit.model, named, sessions)
     if with_drifts_held is not found.fit.model:  # the fit, and what the names rest on, stay as they were
         found = replace(found, fit=replace(found.fit, model=with_drifts_held))
-        after, _, residuals_after = _structure_left_by(with_drifts_held, given)
-        structures = replace(structures, after=after, residuals_after=residuals_after)
-    plain = replace(found.baseline.model, noise=fitted_rms(fine, structures.residuals_before))
-    extended = replace(found.fit.model, noise=fitted_rms(fine, structures.residuals_after))
+        after = _left_by(with_drifts_held, given, structures.told)
+        structures = replace(structures, after=after.structure, residuals_after=after.fine, noise_after=after.noise)
+    plain = replace(found.baseline.model, noise=structures.noise_before)
+    extended = replace(found.fit.model, noise=structures.noise_after)
     baseline, best = errors(fine, plain), errors(fine, extended)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
     skips_own_zeros = found.zero_changes or found.own_gains or given.is_no_unit
@@ -108,10 +110,10 @@ def diagnosed(
     no_more = min(best.rmse**2 - structure**2, extended.noise**2 - structures.within.rms**2)
     noise_variance = max(best.rmse**2 - of_held_out**2, no_more, 0.0)
     explained = verdict in ("adequate", "explained")
-    noise = noise_kinds(
+    noise += noise_with_memory(
         fine,
         extended,
-        integrity.faults,
+        (*integrity.faults, *noise),
         explained or structures.after.is_noise,
         thresholds.material,
         structures.within.memory,
@@ -186,7 +188,8 @@ class _Structures:
 
     ``within`` is that of fitted data only. ``fault_error`` is the rms that data faults add, a share of full scale.
     ``residuals_before`` and ``residuals_after`` are the residuals (n,) of each recording at the full rate, since
-    thinning correlates neighbouring noise.
+    thinning correlates neighbouring noise. In all of them the tones of the faults ``told`` are taken out; in
+    ``noise_before`` and ``noise_after``, the rms over fitted samples, they are not.
     """
 
     before: ResidualStructure
@@ -195,24 +198,60 @@ class _Structures:
     fault_error: float
     residuals_before: Sequence[Array]
     residuals_after: Sequence[Array]
+    noise_before: float
+    noise_after: float
+    told: Sequence[DataFault]
 
 
-def _structures_of(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _Structures:
-    """The residual structures of the baseline and of the extended model."""
-    sessions = given.sessions
-    before, _, residuals_before = _structure_left_by(found.baseline.model, given)
-    after, residuals, residuals_after = _structure_left_by(found.fit.model, given)
-    within = _structure_where_fitted(sessions, residuals, given.thresholds)
+def _structures_of(
+    found: Inference, given: Prepared, faults: Sequence[DataFault], noise: Sequence[DataFault]
+) -> _Structures:
+    """The residual structures of the baseline and of the extended model.
+
+    ``faults`` were told of the recordings, ``noise`` of what the extended model leaves.
+    """
+    sessions, told = given.sessions, [*faults, *noise]
+    before, after = (_left_by(model, given, told) for model in (found.baseline.model, found.fit.model))
+    # A line may be told of what is left for what is held out, which decides no name.
+    partly_held = {one.index for one in sessions if one.fitted.any() and one.judged.any()}
+    of_names = [*faults, *(one for one in noise if one.recording not in partly_held)]
+    thinned = after.thinned if len(of_names) == len(told) else _left_by(found.fit.model, given, of_names).thinned
     return _Structures(
-        before, after, within, fault_rms(faults, sessions, given.scale), residuals_before, residuals_after
+        before.structure,
+        after.structure,
+        _structure_where_fitted(sessions, thinned, given.thresholds),
+        fault_rms(faults, sessions, given.scale),
+        before.fine,
+        after.fine,
+        before.noise,
+        after.noise,
+        told,
     )
 
 
-def _structure_left_by(model: ExtendedModel, given: Prepared) -> tuple[ResidualStructure, list[Array], list[Array]]:
-    """The structure that a model leaves, and the residuals (n,) of each recording, thinned and at the full rate."""
-    residuals, off = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
-    quick = repeating_structure(given.fine, off, given.thresholds)
-    return residual_structure(given.sessions, residuals, given.thresholds, quick), residuals, off
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What a model leaves, told tones apart: its ``structure``, and residuals (n,), ``thinned`` and ``fine``.
+
+    ``noise``: rms over fitted samples at the full rate, with the tones.
+    """
+
+    structure: ResidualStructure
+    thinned: list[Array]
+    fine: list[Array]
+    noise: float
+
+
+def _left_by(model: ExtendedModel, given: Prepared, told: Sequence[DataFault]) -> _Left:
+    """What a model leaves beside the tones that are ``told``."""
+    thinned, fine = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
+    noise = fitted_rms(given.fine, fine)
+    for k, (session, whole) in enumerate(zip(given.sessions, given.fine, strict=True)):
+        if lines_hz := lines_of(session, told):
+            tones = told_tones(whole, fine[k], lines_hz)
+            thinned[k], fine[k] = thinned[k] - as_thinned(tones, session), fine[k] - tones
+    quick = repeating_structure(given.fine, fine, given.thresholds)
+    return _Left(residual_structure(given.sessions, thinned, given.thresholds, quick), thinned, fine, noise)
 
 
 def _is_silent(found: Inference, given: Prepared) -> bool:

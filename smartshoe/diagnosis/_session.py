@@ -252,8 +252,7 @@ def _session(
         thresholds,
     )
     reading = scale.share(logged.reading)
-    # At least so wide that noise of the load is smoothed alike in reading and simulation, whatever the thinning.
-    weights = kernel(1 if template is not None else min(max(factor, LEAST_WINDOW), reading.size))
+    weights = thinning_weights(factor, reading.size) if template is None else kernel(1)
     denoised = (
         template.denoised
         if template is not None
@@ -396,6 +395,14 @@ def kernel(factor: int) -> Array:
         return np.ones(1)
     window = np.hanning(2 * factor + 1)[1:-1]
     return np.asarray(window / window.sum())
+
+
+def thinning_weights(factor: int, size: int) -> Array:
+    """The weights by which a recording of ``size`` samples is averaged before it is thinned by ``factor``.
+
+    At least so wide that noise of the load is smoothed alike in reading and simulation, whatever the thinning.
+    """
+    return kernel(min(max(factor, LEAST_WINDOW), size))
 
 
 def smoothed(signal: Array, weights: Array, factor: int) -> Array:

@@ -305,4 +305,5 @@ def _fault(number: int, recording: Recording, finding: Finding) -> DataFault:
         finding.says,
         finding.severity,
         finding.error,
+        finding.lines_hz,
     )

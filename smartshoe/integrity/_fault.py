@@ -23,7 +23,8 @@ class DataFault:
     ``start_s`` to ``stop_s`` is the time from the first sample at fault to the last, ``share`` the fraction of samples
     at fault. ``severity``: *minor* asks for nothing, *material* would show in a fit that ignores it, *fatal* makes the
     recording useless. ``error`` is the rms, in the reading's unit, that a fault which masks no sample adds to the
-    reading.
+    reading. ``lines_hz`` are the frequencies, as logged, of the lines that it puts into the reading's spectrum, the
+    strongest first.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class DataFault:
     says: str
     severity: Severity = "material"
     error: float = 0.0
+    lines_hz: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``diagnose --json`` lists under ``data_faults``."""
@@ -49,7 +51,7 @@ class Finding:
     ``masks``: no fit may use those samples. ``cut_off`` (n,): other samples that no fit may use, though they are no
     fault: at rest beyond the end of the sensor. ``no_load`` (n,): samples of the load that are not the load. ``values``
     (v,): the values, as recorded, that the reading takes exactly by this fault; ``rail``: the value at which the sensor
-    ends. ``error``: as in `DataFault`.
+    ends. ``error`` and ``lines_hz``: as in `DataFault`.
     """
 
     kind: str
@@ -62,6 +64,7 @@ class Finding:
     no_load: Mask | None = None
     cut_off: Mask | None = None
     rail: float | None = None
+    lines_hz: tuple[float, ...] = ()
 
     @classmethod
     def fatal(cls, kind: str, at: Mask, says: str) -> Finding:

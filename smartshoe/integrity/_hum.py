@@ -38,6 +38,7 @@ def hum(view: View, bad: Mask) -> Iterator[Finding]:
         np.ones(len(view.recording), dtype=bool),
         f"a hum stands in the reading also while the load rests: at {', at '.join(named)} of its span; another"
         " sampling rate would tell a folded line from a true one",
+        lines_hz=tuple(frequency_hz for frequency_hz, _ in found),
     )
 
 

@@ -25,6 +25,7 @@ class SensorEvidence:
     """A test that found something: ``value`` of its ``statistic`` is above ``threshold``; ``says`` is its sentence.
 
     ``strength`` is the standard deviation of what was found, as a share of full scale, where it is largest.
+    ``lines_hz`` are the frequencies, as logged, of the lines of the spectrum that it is about.
     """
 
     statistic: str
@@ -32,6 +33,11 @@ class SensorEvidence:
     threshold: float
     says: str
     strength: float
+
+    @property
+    def lines_hz(self) -> tuple[float, ...]:
+        """None: noise has no lines."""
+        return ()
 
 
 class NoiseEffect(Effect):

@@ -43,6 +43,11 @@ class HumEvidence(SensorEvidence):
     sine: float
     sources: tuple[float, ...]
 
+    @property
+    def lines_hz(self) -> tuple[float, ...]:
+        """The one line."""
+        return (self.frequency_hz,)
+
 
 class Hum(NoiseEffect):
     """+ a sinusoid. The mains' 50 Hz lie at the Nyquist frequency of a 100 Hz log, and 60 Hz appear there at 40 Hz."""
