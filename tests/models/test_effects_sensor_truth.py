@@ -87,8 +87,8 @@ CASES: dict[str, tuple[str, Callable[[np.ndarray, np.ndarray], np.ndarray], dict
         lambda t, p: lag(lag(p, 1.0 / 0.1, FINE_S), 4.0 / 0.1, FINE_S),
         {"second_pole": 0.1},
     ),
-    "a Butterworth filter": ("sensor_lag", lambda t, p: _filtered(t, p, 3.0, np.sqrt(0.5)), {"second_pole": 1.0}),
-    "a tube with its cavity": ("sensor_lag", lambda t, p: _filtered(t, p, 5.0, 0.4), {"second_pole": 1.0}),
+    "a Butterworth filter": ("sensor_lag", lambda t, p: _filtered(t, p, 3.0, np.sqrt(0.5)), {"second_pole": 0.4}),
+    "a tube with its cavity": ("sensor_lag", lambda t, p: _filtered(t, p, 5.0, 0.4), {"second_pole": 0.4}),
     "a transport delay": ("delay", lambda t, p: _late(0.033, 0.0), {}),
     "a slow clock": ("clock_drift", lambda t, p: _late(0.0, 4e-4), {}),
 }  # fmt: skip

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import StateSpace, lsim
 
 from smartshoe.arrays import Array
+from smartshoe.calibration import ExtendedCompensator
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -101,18 +102,31 @@ def test_real_poles_are_undone_by_a_lead_for_each(r: float) -> None:
 
 
 @pytest.mark.parametrize("r", [0.7, 1.0, 2.0])
-def test_a_pair_is_undone_to_first_order_of_the_step(r: float) -> None:
-    values, errors = np.array([0.2, r]), []
+def test_of_a_pair_all_but_the_swing_is_undone(r: float) -> None:
+    """To first order of the step: what is left is (q - 1/4) tau^2 times the second slope."""
+    values, errors = np.array([0.1, r]), []
     for step_s in (0.01, 0.005, 0.0025):
         time_s = np.arange(0.0, 20.0, step_s)
         load = 0.5 - 0.5 * np.cos(2.0 * np.pi * 0.3 * time_s)
+        late = _late(load, *values, step_s)
         inverse = LAG.inverse(values, step_s)
         assert inverse is not None
-        back = inverse.push(_late(load, *values, step_s), time_s)
-        errors.append(float(np.max(np.abs(back - load))))
-    assert errors[0] < 0.01 * 2.0  # within two steps of a slope of one
+        back = inverse.push(late, time_s)
+        swing = (r - 0.5) ** 2 * 0.1**2 * np.gradient(np.gradient(late, step_s), step_s)
+        errors.append(float(np.max(np.abs(back + swing - load)[:-3])))
+    assert errors[0] < 0.01
     assert errors[1] == pytest.approx(errors[0] / 2, rel=0.1)
     assert errors[2] == pytest.approx(errors[1] / 2, rel=0.1)
+
+
+@pytest.mark.parametrize(("tau_s", "r"), [(0.036, 1.64), (0.074, 1.0), (0.028, 1.0), (0.1, 2.0)])
+def test_the_force_behind_a_pair_is_better_undone_than_left(tau_s: float, r: float) -> None:
+    part = ExtendedModel(1.0, 0.0, 1.0, 800.0, 140.0, "mbar").with_part(LAG, np.array([tau_s, r]))
+    load = np.interp(0.01 * np.arange(4000), [0, 2, 6, 10, 14, 15, 16, 40], [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    readings = part.reading(_at(load)) + 0.05 * np.random.default_rng(1).standard_normal(load.size)
+    filter_ = ExtendedCompensator(part, 1.0 / STEP_S)
+    off, left = filter_.apply(readings) / 800.0 - load, readings / filter_.reading_per_share - load
+    assert np.sqrt(np.mean(off**2)) < 0.8 * np.sqrt(np.mean(left**2))
 
 
 def test_a_file_from_before_there_were_pairs_says_the_same() -> None:
