@@ -53,3 +53,14 @@ def lagged_by_direction(start, rise, keep_rising, fall, keep_falling):  # type: 
             last = down
         out[k] = last
     return out
+
+
+@njit(cache=True)
+def lagged_by_pair(start, drive, keep, share):  # type: ignore[no-untyped-def]
+    """Re w + ``share`` Im w (n,) of complex w, each ``keep`` times the value before plus the ``drive`` of its step."""
+    out = np.empty(drive.size)
+    last = complex(start)
+    for k in range(drive.size):
+        last = keep * last + drive[k]
+        out[k] = last.real + share * last.imag
+    return out

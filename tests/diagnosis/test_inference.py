@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import StateSpace, lfilter, lsim
 from told_evidence import taken_for_exact
 
 from smartshoe import Recording, diagnose, dynamic_protocol
@@ -219,6 +219,35 @@ def test_a_lag_that_an_arm_as_walls_have_imitates_is_a_lag() -> None:
     (cause,) = diagnose(runs).causes
     assert cause.name == "sensor_lag"
     assert cause.parameters["time_constant"].value == pytest.approx(lag_s, rel=0.2)
+
+
+@pytest.mark.parametrize(("cutoff_hz", "damping"), [(2.0, 0.7), (6.0, 0.7), (2.5, 0.4), (5.0, 0.4)])
+def test_a_lag_of_two_poles_that_are_a_pair_is_a_lag_alone(cutoff_hz: float, damping: float) -> None:
+    """Of a Butterworth filter, or a tube with its cavity, two real poles were a delay, or left a gas that heats."""
+    turn, step_s = 2.0 * np.pi * cutoff_hz, 0.002
+    line = StateSpace([[0.0, turn], [-turn, -2.0 * damping * turn]], [[0.0], [turn]], [[1.0, 0.0]], [[0.0]])
+    protocols = {
+        "triangles": dynamic_protocol((50, 200, 800), repeats=2, rest_s=4.0),
+        "others": dynamic_protocol((100, 400), repeats=3, rest_s=3.0),
+    }
+    runs, rng = [], np.random.default_rng(round(10 * cutoff_hz + damping))
+    keep = np.exp(-step_s / 0.9)
+    for name, protocol in protocols.items():
+        time_s = np.arange(0.0, protocol.duration_s, step_s)
+        load = protocol.load_at(time_s)
+        pressure = 0.2 * load + 0.03 * lfilter([1.0 - keep], [1.0, -keep], load)
+        read = lsim(line, pressure, time_s)[1] + 0.1 * rng.standard_normal(time_s.size)
+        every = slice(None, None, 5)
+        runs.append(
+            Recording.from_arrays(time_s=time_s[every], force_n=load[every], pressure_mbar=read[every], name=name)
+        )
+    found = diagnose(runs[:1], hold_out=runs[1:])
+    (cause,) = found.causes
+    assert cause.name == "sensor_lag"
+    assert cause.confidence > 0.95
+    assert not found.minor
+    assert cause.parameters["time_constant"].value == pytest.approx(2.0 * damping / turn, rel=0.02)
+    assert 0.5 / np.sqrt(0.25 + (cause.parameters["second_pole"].value - 0.5) ** 2) == pytest.approx(damping, rel=0.02)
 
 
 @pytest.mark.parametrize("bow", [0.03, -0.03])

@@ -441,6 +441,10 @@ def test_c_gives_the_numbers_of_push(tmp_path: Path) -> None:
         found = one.inverse(values, STEP_S)
         assert found is not None
         inverses[name] = found
+    for name, lag, values in (("pair", "sensor_lag", [0.03, 1.2]), ("by_direction", "flexible_lag", [0.03, -0.4])):
+        found = effect(lag).inverse(np.array(values), STEP_S)
+        assert found is not None
+        inverses[name] = found
     steps = {name: inverse.c_step(f"b{k}") for k, (name, inverse) in enumerate(inverses.items())}
     members = {member: start for step in steps.values() for member, start in step.states.items()}
     source = ["#include <math.h>", "typedef struct {"]

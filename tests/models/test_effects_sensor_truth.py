@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.signal import StateSpace, lsim
 
 from simulators.effects.sensing import Curve, Limit, OutputDrift
 from simulators.plant.bladder import SimulatedBladder
@@ -62,6 +63,13 @@ def _late(delay_s: float, skew: float) -> np.ndarray:
     return np.interp(time_s * (1.0 - skew) - delay_s, time_s, share)
 
 
+def _filtered(t: np.ndarray, p: np.ndarray, hz: float, damping: float) -> np.ndarray:
+    """Behind a mass on a spring and a damper, as a state space of scipy."""
+    turn = 2.0 * np.pi * hz
+    mass = StateSpace([[0.0, turn], [-turn, -2.0 * damping * turn]], [[0.0], [turn]], [[1.0, 0.0]], [[0.0]])
+    return np.asarray(lsim(mass, p, t)[1])
+
+
 CASES: dict[str, tuple[str, Callable[[np.ndarray, np.ndarray], np.ndarray], dict[str, float]]] = {
     "a bridge": ("sensor_nonlinearity", lambda t, p: Curve(bridge=0.2)(p), {}),
     "a compressing amplifier": ("sensor_nonlinearity", lambda t, p: Curve(compression=1.5)(p), {}),
@@ -79,6 +87,8 @@ CASES: dict[str, tuple[str, Callable[[np.ndarray, np.ndarray], np.ndarray], dict
         lambda t, p: lag(lag(p, 1.0 / 0.1, FINE_S), 4.0 / 0.1, FINE_S),
         {"second_pole": 0.1},
     ),
+    "a Butterworth filter": ("sensor_lag", lambda t, p: _filtered(t, p, 3.0, np.sqrt(0.5)), {"second_pole": 0.4}),
+    "a tube with its cavity": ("sensor_lag", lambda t, p: _filtered(t, p, 5.0, 0.4), {"second_pole": 0.4}),
     "a transport delay": ("delay", lambda t, p: _late(0.033, 0.0), {}),
     "a slow clock": ("clock_drift", lambda t, p: _late(0.0, 4e-4), {}),
 }  # fmt: skip

@@ -1,10 +1,13 @@
-"""First-order lags of a sampled signal, one or two in a row, and their inverse on a stream."""
+"""Lags of a sampled signal, by one pole or by a pair that swings, and their inverse on a stream."""
 
 from __future__ import annotations
 
+import cmath
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
@@ -16,12 +19,15 @@ POINTS, WEIGHTS = (0.5 * values for values in np.polynomial.legendre.leggauss(12
 POWERS = (POINTS - 0.5) ** np.arange(4)[:, None]  # (power, point): of s between -1 and 0
 
 
-def _weights(x: float) -> Array:
-    """(4,) weights of the samples at `NODES` in the integral of x exp(x s) u(s) over s from -1 to 0, u a cubic."""
-    if x < 2.0:
-        moments = np.sum(WEIGHTS * x * np.exp(x * POWERS[1]) * POWERS, axis=1)
+def _weights(x: complex, decay: complex) -> NDArray[Any]:
+    """(4,) weights of the samples at `NODES` in the integral of x exp(x s) u(s) over s from -1 to 0, u a cubic.
+
+    ``decay`` is exp(-x); the weights are real where x is.
+    """
+    if abs(x) < 2.0:
+        moments: NDArray[Any] = np.sum(WEIGHTS * x * np.exp(x * POWERS[1]) * POWERS, axis=1)
     else:
-        decay, moments = math.exp(-x), np.empty(4)
+        moments = np.empty(4, dtype=type(x))
         moments[0] = 1.0 - decay
         for i in range(1, 4):
             moments[i] = -((-1.0) ** i) * decay - i / x * moments[i - 1]
@@ -35,7 +41,21 @@ def lagged(u: Array, x: float) -> Array:
     if u.size < 2:
         return u.copy()
     decay = math.exp(-x)
-    return linear_filter([1.0], [1.0, -decay], _drive(u, x), [decay * u[0]])[0]
+    return linear_filter([1.0], [1.0, -decay], _drive(u, x, decay), [decay * u[0]])[0]
+
+
+def lagged_by_pair(u: Array, x: complex) -> Array:
+    """y (n,) of the poles -x and its conjugate, in 1/steps, for ``u`` (n,); u = y before the first sample.
+
+    In partial fractions the one is the conjugate of the other, so that one complex recursion gives both:
+    y = Re w + Re T/Im T Im w with w' = (u - w) x and T = 1/x.
+    """
+    from smartshoe.kernels import sensing
+
+    if u.size < 2:
+        return u.copy()
+    decay = cmath.exp(-x)
+    return np.asarray(sensing.lagged_by_pair(u[0], _drive(u, x, decay), decay, -x.real / x.imag))
 
 
 def lagged_by_direction(u: Array, rising: float, falling: float) -> Array:
@@ -44,59 +64,60 @@ def lagged_by_direction(u: Array, rising: float, falling: float) -> Array:
 
     if u.size < 2:
         return u.copy()
-    rise, fall = _drive(u, rising), _drive(u, falling)
-    return np.asarray(sensing.lagged_by_direction(u[0], rise, math.exp(-rising), fall, math.exp(-falling)))
+    keep_rising, keep_falling = math.exp(-rising), math.exp(-falling)
+    rise, fall = _drive(u, rising, keep_rising), _drive(u, falling, keep_falling)
+    return np.asarray(sensing.lagged_by_direction(u[0], rise, keep_rising, fall, keep_falling))
 
 
-def _drive(u: Array, x: float) -> Array:
-    """(n,) what each step adds to w, beside exp(-x) times its last value."""
+def _drive(u: Array, x: complex, decay: complex) -> NDArray[Any]:
+    """(n,) what each step adds to w, beside ``decay`` = exp(-x) times its last value."""
     padded = np.concatenate([[u[0], u[0]], u, [2.0 * u[-1] - u[-2]]])
-    drive: Array = np.convolve(padded, _weights(x)[::-1], "valid")
-    drive[0] = (1.0 - math.exp(-x)) * u[0]
+    drive: NDArray[Any] = np.convolve(padded, _weights(x, decay)[::-1], "valid")
+    drive[0] = (1.0 - decay) * u[0]
     return drive
 
 
 class Lead(Inverse):
-    """Two leads in a row, the inverse of two lags; their times are in steps.
+    """x = y + T (Dy + turning D(Dy)), D the difference to the last sample: the inverse of a lag of one or two poles.
 
-    The first one's time is ``rising`` or ``falling``, as the signal rises or falls; the second one's is ``fast``.
+    T is ``rising`` or ``falling``, as the signal rises or falls. Both times are in steps; two leads T1 and T2 in a row
+    have T = T1 + T2 and turning = T1 T2/T.
     """
 
-    def __init__(self, rising: float, falling: float, fast: float) -> None:
-        self.rising, self.falling, self.fast = rising, falling, fast
+    def __init__(self, rising: float, falling: float, turning: float = 0.0) -> None:
+        self.rising, self.falling, self.turning = rising, falling, turning
         self.reset()
 
     def reset(self) -> None:
-        self._last: tuple[float, float] | None = None
+        self._last: tuple[float, float] | None = None  # the signal, and by how much it had moved
 
     def push(self, signal: Array, time_s: Array) -> Array:
         if signal.size == 0:
             return signal.copy()
-        first, second = self._last or (float(signal[0]), float(signal[0]))
-        moved = np.diff(signal, prepend=first)
-        between = signal + np.where(moved > 0.0, self.rising, self.falling) * moved
-        self._last = float(signal[-1]), float(between[-1])
-        return between + self.fast * np.diff(between, prepend=second)
+        before, moved_before = self._last or (float(signal[0]), 0.0)
+        moved = np.diff(signal, prepend=before)
+        lead = np.where(moved > 0.0, self.rising, self.falling)
+        self._last = float(signal[-1]), float(moved[-1])
+        return np.asarray(signal + lead * (moved + self.turning * np.diff(moved, prepend=moved_before)))
 
     def c_step(self, name: str) -> CStep:
-        first, second, begun = f"{name}_first", f"{name}_second", f"{name}_begun"
-        slow = f"x += {c_number(self.rising)} * (x - f->{first});"
+        last, moved, begun = f"{name}_last", f"{name}_moved", f"{name}_begun"
+        states = {last: 0.0, begun: 0.0}
+        lead, turn, keep, forget = c_number(self.rising), "moved", "", ""
         if self.falling != self.rising:
-            falling = f"x += {c_number(self.falling)} * (x - f->{first});"
-            slow = f"if (x > f->{first}) {{ {slow} }} else {{ {falling} }}"
+            lead = f"(moved > 0.0 ? {lead} : {c_number(self.falling)})"
+        if self.turning != 0.0:
+            states[moved] = 0.0
+            turn = f"(moved + {c_number(self.turning)} * (moved - f->{moved}))"
+            keep, forget = f"\n    f->{moved} = moved;", f"\n        f->{moved} = 0.0;"
         body = f"""{{
-    const double lagged = x;
+    double moved;
     if (f->{begun} <= 0.0) {{
-        f->{first} = x;
-        f->{second} = x;
+        f->{last} = x;{forget}
         f->{begun} = 1.0;
     }}
-    {slow}
-    f->{first} = lagged;
-    {{
-        const double between = x;
-        x += {c_number(self.fast)} * (x - f->{second});
-        f->{second} = between;
-    }}
+    moved = x - f->{last};
+    f->{last} = x;
+    x += {lead} * {turn};{keep}
 }}"""
-        return CStep({first: 0.0, second: 0.0, begun: 0.0}, body)
+        return CStep(states, body)

@@ -46,4 +46,4 @@ class FlexibleLag(Effect):
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """P = y + T y', with T by the sign of the slope since the last sample; exact for steady ramps."""
         tau, direction = (float(value) for value in values)
-        return Lead((1.0 + direction) * tau / step_s, (1.0 - direction) * tau / step_s, 0.0)
+        return Lead((1.0 + direction) * tau / step_s, (1.0 - direction) * tau / step_s)
