@@ -175,8 +175,9 @@ def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], th
         or rms_difference(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable
     ):
         return None
+    end_s = 1.0 / (RATE.lower if slow else RATE.upper)
     return (
-        f"the baseline's relaxation has come to the end of its range, {1.0 / (RATE.lower if slow else RATE.upper):g} s:"
+        f"the baseline's relaxation has come to the end of its range, {end_s:.3g} s:"
         f" a unit that relaxes {'more slowly' if slow else 'faster'} is beyond it, and what is named may be that"
     )
 

@@ -246,9 +246,9 @@ def _left_by(model: ExtendedModel, given: Prepared, told: Sequence[DataFault]) -
     """What a model leaves beside the tones that are ``told``."""
     thinned, fine = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
     noise = fitted_rms(given.fine, fine)
-    for k, (session, whole) in enumerate(zip(given.sessions, given.fine, strict=True)):
+    for k, session in enumerate(given.sessions):
         if lines_hz := lines_of(session, told):
-            tones = told_tones(whole, fine[k], lines_hz)
+            tones = told_tones(given.fine[k], fine[k], lines_hz)
             thinned[k], fine[k] = thinned[k] - as_thinned(tones, session), fine[k] - tones
     quick = repeating_structure(given.fine, fine, given.thresholds)
     return _Left(residual_structure(given.sessions, thinned, given.thresholds, quick), thinned, fine, noise)

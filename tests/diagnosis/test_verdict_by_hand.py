@@ -481,18 +481,22 @@ def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rate_per_s", "said"),
-    [(0.2, None), (0.01, "100 s: a unit that relaxes more slowly"), (50.0, "0.02 s: a unit that relaxes faster")],
+    ("rate_per_s", "share", "said"),
+    [
+        (0.2, 0.1, None),
+        (0.01, 0.1, "100 s: a unit that relaxes more slowly"),
+        (2550.0, 50.0, "0.000392 s: a unit that relaxes faster"),
+    ],
 )
 def test_a_unit_beyond_the_range_that_can_be_followed_is_told(
-    monkeypatch: pytest.MonkeyPatch, rate_per_s: float, said: str | None
+    monkeypatch: pytest.MonkeyPatch, rate_per_s: float, share: float, said: str | None
 ) -> None:
     step_s = 0.05
     load = np.tile(np.repeat([0.0, 1.0], 5), 240)
     session: Any = SimpleNamespace(
         conditions=Conditions(step_s * np.arange(load.size), load, step_s), reading=load, fitted=load >= 0.0
     )
-    model = replace(MODEL, relaxation_rate_per_s=rate_per_s)
+    model = replace(MODEL, relaxing_share=share, relaxation_rate_per_s=rate_per_s)
     with_own = {"residual_of": lambda one, model: one.reading - model.simulate(one.conditions)}
     for name, stand_in in with_own.items():
         monkeypatch.setattr(_validation, name, stand_in)

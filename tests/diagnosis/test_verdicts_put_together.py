@@ -89,11 +89,11 @@ def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) ->
     assert [one.effect for one in told.rivals] == ["delay", "linear_leak", "dead_band", "rate_gain"]  # no block is one
     assert [one.margin for one in told.rivals] == [0.0, 2.0, 3.0, 4.0]
     assert told.minor == ("linear_leak", "delay")
-    assert parts.seen["noise_kinds"][0][3] is False
+    assert parts.seen["noise_with_memory"][0][3] is False
     parts.seen.clear()
     parts.kinds[1].is_noise = True
     run_diagnosis(parts)
-    assert parts.seen["noise_kinds"][0][3] is True
+    assert parts.seen["noise_with_memory"][0][3] is True
 
 
 def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
@@ -107,7 +107,7 @@ def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
     assert (told.verdict, told.leftover) == ("adequate", None)
     assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.05**2 - 0.01**2) / 0.04))
     assert parts.seen["next_experiment"][1] == {"open_": False, "worse": False}
-    assert parts.seen["noise_kinds"][0][3] is True
+    assert parts.seen["noise_with_memory"][0][3] is True
 
 
 def test_where_a_kind_has_no_law_or_none_is_sure_no_more_than_what_is_tolerable_may_be_left(parts: Any) -> None:

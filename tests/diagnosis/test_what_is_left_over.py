@@ -23,7 +23,7 @@ from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, re
 from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating_structure, repeats, slow_structure
 from smartshoe.diagnosis._limits import limit_own_zeros
 from smartshoe.diagnosis._noise import effective_noise_sd
-from smartshoe.diagnosis._noise_kinds import noise_kinds
+from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate
@@ -421,7 +421,8 @@ def _kinds(
 ) -> list[tuple[str, int]]:
     given = [replace(s, reading=s.reading + one) for s, one in zip(sessions, noise, strict=True)]
     told = {"explained": True, "material": 1e-4, "memory": None, **changes}
-    found = noise_kinds(given, MODEL, known or [], **told)
+    first = noise_without_memory(given, MODEL, known or [], told["material"])
+    found = [*first, *noise_with_memory(given, MODEL, [*(known or []), *first], **told)]
     return [(one.kind, one.recording) for one in found]
 
 
@@ -457,7 +458,7 @@ def test_coloured_noise_is_told_where_no_structure_would_be_taken_for_it(fine: l
     assert "coloured_noise" not in dict(_kinds(fine, spectrum_statistic, explained=False))
     assert _kinds(fine, _white(fine), memory=_memory(spectrum_statistic=9.0)) == []
     assert _kinds(fine, _white(fine), memory=_memory(rms=1e-5)) == []
-    (first, _) = noise_kinds(fine, MODEL, [], True, 1e-4, _memory(tau_s=1.25))
+    (first, _) = noise_with_memory(fine, MODEL, [], True, 1e-4, _memory(tau_s=1.25))
     assert "1.2 s" in first.says
     assert "0.4 % of full scale" in first.says
     run = fine[0].recording

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock
 from smartshoe.diagnosis._held_out import initial_memory_of
-from smartshoe.diagnosis._noise_kinds import noise_kinds
+from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._zero import _drift_at_rest, _zero_by_model, first_rests, offsets, sd_of_a_mean, zeros_of
@@ -442,7 +442,7 @@ def _kinds(monkeypatch: pytest.MonkeyPatch, sessions: list[Any], **given: Any) -
     def evidence(kind: str, strength: float) -> Any:
         def told(self: Any, residual: Array, conditions: Any, prediction: Array) -> Any:
             asked.append((float(residual[0]), float(prediction[0]), conditions.step_s))
-            return SimpleNamespace(strength=strength, says=f"says {kind}")
+            return SimpleNamespace(strength=strength, says=f"says {kind}", lines_hz=())
 
         return told
 
@@ -451,7 +451,9 @@ def _kinds(monkeypatch: pytest.MonkeyPatch, sessions: list[Any], **given: Any) -
         monkeypatch.setattr(type(effect(kind)), "evidence", evidence(kind, strength))
     model: Any = SimpleNamespace(simulate=lambda conditions: np.full(20, 1.0))
     asked_with = {"known": [], "explained": True, "material": 0.1, "memory": None, **given}
-    found = noise_kinds(sessions, model, **asked_with)
+    first = noise_without_memory(sessions, model, asked_with["known"], asked_with["material"])
+    asked_with["known"] = [*asked_with["known"], *first]
+    found = [*first, *noise_with_memory(sessions, model, **asked_with)]
     assert set(asked) <= {(2.0, 1.0, 0.1)}
     return found
 
@@ -467,7 +469,7 @@ def test_kinds_as_strong_as_what_counts_are_told_throughout(monkeypatch: pytest.
 
 def test_where_a_fault_imitates_noise_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     def fault(kind: str, recording: int = 4) -> Any:
-        return SimpleNamespace(kind=kind, recording=recording)
+        return SimpleNamespace(kind=kind, recording=recording, lines_hz=())
 
     for kind in ("held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"):
         assert _kinds(monkeypatch, [_fine(4)], known=[fault(kind)]) == []

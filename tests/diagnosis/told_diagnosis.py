@@ -35,6 +35,10 @@ class _Session:
     usable: NDArray[np.bool_] = field(default_factory=lambda: np.ones(3, dtype=bool))
 
     @property
+    def judged(self) -> NDArray[np.bool_]:
+        return self.usable & ~self.fitted
+
+    @property
     def conditions(self) -> Any:
         return SimpleNamespace(time_s=np.arange(3.0), before={})
 
@@ -101,12 +105,15 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("names_of", lambda *_: tuple(made.names))
     answer("reason_of_another_kind", lambda name, *_: "it turned" if name.name == "turned" else None)
     answer("zeros_of", lambda *_: tuple(made.zeros))
+    answer("may_be_remembered", lambda *_: False)
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
     answer("fitted_rms", lambda *_: made.off)
     answer("cause_of", cause)
     answer("zero_cause_of", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
     answer("_with_offset", "with offset")
-    answer("noise_kinds", ["noise"])
+    answer("noise_without_memory", lambda *_: [])
+    answer("noise_with_memory", ["noise"])
+    answer("lines_of", ())
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
     answer("limit_wall_ratio", lambda *_: made.wall_ratio)
     answer("limit_not_undone", lambda *_: list(made.not_undone))
