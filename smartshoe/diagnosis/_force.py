@@ -214,14 +214,20 @@ def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[s
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
             return []
         return [
-            f"the force of {name} is off by {worst_n:.2g} N (rms): the {held_n:.2g} N of what is held out do not hold"
-            " for loads as it has"
+            f"the force of {name} is off by {_rounded(worst_n)} N (rms): the {_rounded(held_n)} N of what is held out"
+            " do not hold for loads as it has"
         ]
     return [
         "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
-        f" {name} is off by {worst_n:.2g} N (rms); with its own zero, and what it bore before, allowed for it would be"
-        f" {stated_n:.2g} N (zero the load cell and the sensor before each recording, and begin it with a rest)"
+        f" {name} is off by {_rounded(worst_n)} N (rms); with its own zero, and what it bore before, allowed for it"
+        f" would be {_rounded(stated_n)} N (zero the load cell and the sensor before each recording, and begin it with"
+        " a rest)"
     ]
+
+
+def _rounded(force_n: float) -> str:
+    """A force in N to two digits, without an exponent."""
+    return f"{float(f'{force_n:.2g}'):,g}"
 
 
 def _force_error_n(session: Session, model: ExtendedModel) -> Array:

@@ -17,6 +17,7 @@ from smartshoe.diagnosis import Thresholds, _force
 from smartshoe.diagnosis._force import (
     Compensation,
     ForceError,
+    _rounded,
     compensation,
     force_error,
     limit_calibration_off,
@@ -270,3 +271,8 @@ def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
         found = Compensation([one], model, nothing, nothing, nothing, undone_by)
         assert found.undone.names == names
     assert found.undone is MODEL
+
+
+@pytest.mark.parametrize(("force_n", "said"), [(0.0384, "0.038"), (3.3, "3.3"), (149.6, "150"), (1234.0, "1,200")])
+def test_a_force_is_said_to_two_digits_without_an_exponent(force_n: float, said: str) -> None:
+    assert _rounded(force_n) == said
