@@ -19,7 +19,7 @@ from smartshoe.signals.lags import lagged
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # about the mean of the paper's four units (Table 1)
 _, SHARE, RATE = BASELINE
 MOST_OF_WALL = 5.0  # share; beyond it the static gain is six times the instant one, and the wall a dashpot
-FASTEST_PER_S = 50.0  # pole; a wall's arm is slower, a sensor's lag seldom faster
+FASTEST_PER_S = RATE.upper / (1.0 + SHARE.upper)  # pole; a wall's arm is slower, a sensor's lag seldom faster
 # A resolution of the start. All halved or doubled, no name changed in two cases.
 POLES_PER_S = np.geomspace(RATE.lower, FASTEST_PER_S, 35)
 WALL_RATIOS = 1.02, 50.0  # bounds for any tube
@@ -61,8 +61,8 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
         share = float(slow / fast) if fast != 0.0 else SHARE.upper
         # Within the bounds of share and rate, since a fit starts there: beyond them it would be another solid.
-        lowest, highest = max(SHARE.lower, RATE.lower / pole - 1.0), min(SHARE.upper, RATE.upper / pole - 1.0)
-        shares = (share,) if lowest <= share <= highest else (lowest, highest)
+        lowest = max(SHARE.lower, RATE.lower / pole - 1.0)
+        shares = (share,) if lowest <= share <= SHARE.upper else (lowest, SHARE.upper)
         for share in shares:
             shape = np.array([1.0, share]) / (1.0 + share)
             gain = float(shape @ gram[1:, 0] / (shape @ part @ shape))

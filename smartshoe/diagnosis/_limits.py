@@ -185,22 +185,24 @@ def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], th
 def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> str | None:
     """The sentence on a curve at the end of its range, in the model or as the law that names a block."""
     if ended := [part.name for part in model.parts if part.bends_too_little]:
-        return (
-            f"{listed(ended, 'and')} has come to the end of its range: the unit bends farther"
-            " than that equation can, and what it misses may stand in the names of other effects, which are half sure"
-            " at most"
-        )
+        but = "and what it misses may stand in the names of other effects, which are half sure at most"
+        return _at_end_of_range(ended, but)
     by = [
         (one.effect.name, one.law_in_place.fit.model)
         for one in names
         if one.law_in_place is not None and one.law_in_place.fit is not None
     ]
     if followed := [name for name, fitted in by if fitted.part(name).bends_too_little]:
-        return (
-            f"{listed(followed, 'and')} has come to the end of its range: the unit bends farther than that equation"
-            " can, so that its parameters are bounds (the extended model keeps the free form)"
-        )
+        return _at_end_of_range(followed, "so that its parameters are bounds (the extended model keeps the free form)")
     return None
+
+
+def _at_end_of_range(curves: Sequence[str], follows: str) -> str:
+    """The sentence on ``curves`` at the end of their range, and what ``follows`` from it."""
+    return (
+        f"{listed(curves, 'and')} has come to the end of its range: the unit bends farther than that equation can,"
+        f" {follows}"
+    )
 
 
 def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:

@@ -210,12 +210,16 @@ def _structures_of(
 
     ``faults`` were told of the recordings, ``noise`` of what the extended model leaves.
     """
-    sessions, told = given.sessions, [*faults, *noise]
+    sessions = given.sessions
+    of_faults, of_residuals = ([one for one in some if one.lines_hz] for some in (faults, noise))
+    told = [*of_faults, *of_residuals]
     before, after = (_left_by(model, given, told) for model in (found.baseline.model, found.fit.model))
     # A line may be told of what is left for what is held out, which decides no name.
     partly_held = {one.index for one in sessions if one.fitted.any() and one.judged.any()}
-    of_names = [*faults, *(one for one in noise if one.recording not in partly_held)]
-    thinned = after.thinned if len(of_names) == len(told) else _left_by(found.fit.model, given, of_names).thinned
+    of_names = [*of_faults, *(one for one in of_residuals if one.recording not in partly_held)]
+    thinned = after.thinned
+    if len(of_names) < len(told):
+        thinned, _ = _without_tones(given, *_residuals(found.fit.model, given), of_names)
     return _Structures(
         before.structure,
         after.structure,
@@ -244,14 +248,29 @@ class _Left:
 
 def _left_by(model: ExtendedModel, given: Prepared, told: Sequence[DataFault]) -> _Left:
     """What a model leaves beside the tones that are ``told``."""
-    thinned, fine = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
+    thinned, fine = _residuals(model, given)
     noise = fitted_rms(given.fine, fine)
+    thinned, fine = _without_tones(given, thinned, fine, told)
+    quick = repeating_structure(given.fine, fine, given.thresholds)
+    return _Left(residual_structure(given.sessions, thinned, given.thresholds, quick), thinned, fine, noise)
+
+
+def _residuals(model: ExtendedModel, given: Prepared) -> tuple[list[Array], list[Array]]:
+    """What a model leaves of each recording (n,), thinned and at the full rate."""
+    thinned, fine = ([residual_of(one, model) for one in some] for some in (given.sessions, given.fine))
+    return thinned, fine
+
+
+def _without_tones(
+    given: Prepared, thinned: Sequence[Array], fine: Sequence[Array], told: Sequence[DataFault]
+) -> tuple[list[Array], list[Array]]:
+    """Residuals (n,) of each recording, thinned and at the full rate, without the tones that are ``told``."""
+    thinned, fine = [*thinned], [*fine]
     for k, session in enumerate(given.sessions):
         if lines_hz := lines_of(session, told):
             tones = told_tones(given.fine[k], fine[k], lines_hz)
             thinned[k], fine[k] = thinned[k] - as_thinned(tones, session), fine[k] - tones
-    quick = repeating_structure(given.fine, fine, given.thresholds)
-    return _Left(residual_structure(given.sessions, thinned, given.thresholds, quick), thinned, fine, noise)
+    return thinned, fine
 
 
 def _is_silent(found: Inference, given: Prepared) -> bool:

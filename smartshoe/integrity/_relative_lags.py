@@ -104,9 +104,9 @@ def refined_clock(
     factor, plain = 1.0, clock
     if not clock.rate:
         factor, plain = thresholds.clear, _least_squares_clock(clock, 1, compared, thresholds)
-    if line is None or factor * residual_squares(compared, line) >= residual_squares(compared, plain):
-        return clock
-    return line
+    if line is not None and factor * residual_squares(compared, line) < residual_squares(compared, plain):
+        return line
+    return clock
 
 
 @on_one_thread

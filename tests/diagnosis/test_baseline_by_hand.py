@@ -82,22 +82,25 @@ def test_a_share_beyond_what_a_wall_can_have_is_held_at_its_bound(fast: float, s
     assert told == pytest.approx(_slow_baseline(sessions), rel=1e-5)
 
 
-@pytest.mark.parametrize("lag_s", [0.5, 1.0, 2.0])
-def test_a_fit_begins_at_the_solid_that_was_weighed_also_where_the_reading_is_late(lag_s: float) -> None:
-    """A reading that is late asks for a share and a rate without end, of which a fit would cut the rate alone."""
+def _lagging_sessions(lag_s: float) -> list[Any]:
+    """Of a sensor that does nothing but lag, by two equal poles."""
     sessions = sessions_under(MODEL)
     for one in sessions:
         one.reading = lagged(lagged(one.conditions.load, STEP_S, 0.5 * lag_s), STEP_S, 0.5 * lag_s)
-    found = baseline_of(sessions, SCALE)
+    return sessions
+
+
+@pytest.mark.parametrize("lag_s", [0.5, 1.0, 2.0])
+def test_a_fit_begins_at_the_solid_that_was_weighed_also_where_the_reading_is_late(lag_s: float) -> None:
+    """A reading that is late asks for a share and a rate without end, of which a fit would cut the rate alone."""
+    found = baseline_of(_lagging_sessions(lag_s), SCALE)
     assert within_bounds(found).theta == pytest.approx(found.theta, rel=1e-12)
 
 
 @pytest.mark.parametrize("lag_s", [0.1, 0.3, 1.0])
 def test_a_sensor_that_only_lags_is_followed_as_closely_as_by_least_squares(lag_s: float) -> None:
     """Up to 98 % may relax, whatever the pole, so that none of the grid's poles is better at any share."""
-    sessions = sessions_under(MODEL)
-    for one in sessions:
-        one.reading = lagged(lagged(one.conditions.load, STEP_S, 0.5 * lag_s), STEP_S, 0.5 * lag_s)
+    sessions = _lagging_sessions(lag_s)
     found = baseline_of(sessions, SCALE)
     for pole in POLES_PER_S[10:]:
         for share in (0.5, 5.0, 20.0, SHARE.upper):

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
+from told_noise import kinds_of_noise
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._force import (
@@ -23,7 +24,7 @@ from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, re
 from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating_structure, repeats, slow_structure
 from smartshoe.diagnosis._limits import limit_own_zeros
 from smartshoe.diagnosis._noise import effective_noise_sd
-from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
+from smartshoe.diagnosis._noise_kinds import noise_with_memory
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate
@@ -421,8 +422,7 @@ def _kinds(
 ) -> list[tuple[str, int]]:
     given = [replace(s, reading=s.reading + one) for s, one in zip(sessions, noise, strict=True)]
     told = {"explained": True, "material": 1e-4, "memory": None, **changes}
-    first = noise_without_memory(given, MODEL, known or [], told["material"])
-    found = [*first, *noise_with_memory(given, MODEL, [*(known or []), *first], **told)]
+    found = kinds_of_noise(given, MODEL, known or [], **told)
     return [(one.kind, one.recording) for one in found]
 
 

@@ -13,11 +13,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as student
+from told_noise import kinds_of_noise
 
 from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock
 from smartshoe.diagnosis._held_out import initial_memory_of
-from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._zero import _drift_at_rest, _zero_by_model, first_rests, offsets, sd_of_a_mean, zeros_of
@@ -451,9 +451,7 @@ def _kinds(monkeypatch: pytest.MonkeyPatch, sessions: list[Any], **given: Any) -
         monkeypatch.setattr(type(effect(kind)), "evidence", evidence(kind, strength))
     model: Any = SimpleNamespace(simulate=lambda conditions: np.full(20, 1.0))
     asked_with = {"known": [], "explained": True, "material": 0.1, "memory": None, **given}
-    first = noise_without_memory(sessions, model, asked_with["known"], asked_with["material"])
-    asked_with["known"] = [*asked_with["known"], *first]
-    found = [*first, *noise_with_memory(sessions, model, **asked_with)]
+    found = kinds_of_noise(sessions, model, **asked_with)
     assert set(asked) <= {(2.0, 1.0, 0.1)}
     return found
 

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._procedure import diagnosed
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import effect
 
-FAULT: Any = SimpleNamespace(kind="gaps", recording=0, error=0.0)
+FAULT: Any = SimpleNamespace(kind="gaps", recording=0, error=0.0, lines_hz=())
 SCREENED = ("delay", "flexible_lag", "linear_leak", "dead_band", "rate_gain", "warm_up")
 SCREENING = tuple((name, float(k)) for k, name in enumerate(SCREENED))
 FINE: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.05))
@@ -113,7 +113,6 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("_with_offset", "with offset")
     answer("noise_without_memory", lambda *_: [])
     answer("noise_with_memory", ["noise"])
-    answer("lines_of", ())
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
     answer("limit_wall_ratio", lambda *_: made.wall_ratio)
     answer("limit_not_undone", lambda *_: list(made.not_undone))
