@@ -11,6 +11,8 @@ small part of the record, but is unbiased where a fit of the whole record is not
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from smartshoe.arrays import Array
@@ -55,13 +57,37 @@ def corners(time_s: Array, load: Array) -> Array:
     return times
 
 
+@dataclass(frozen=True, slots=True)
+class AtCorners:
+    """Delay in s and clock rate from a load's corners, with their sds."""
+
+    delay_s: float
+    delay_sd_s: float
+    rate: float
+    rate_sd: float
+
+
 def follow_corners(
     machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
-) -> tuple[float, float, float, float] | None:
-    """Delay in s, its sd, clock rate, its sd, searched from ``delay_s`` on.
+) -> AtCorners | None:
+    """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) by the corners of ``load`` (m,) at ``machine_s`` (m,).
 
-    None where the load has fewer than two corners.
+    The search begins on either side of ``delay_s``, half of `SLOPE_OVER_S` away, within which a corner is seen. None
+    where the load has fewer than two corners, or where these do not lead both searches to one delay: kinks of a smooth
+    load's noise hold a search wherever it begins.
     """
+    aside = 0.5 * SLOPE_OVER_S
+    ends = [_searched_from(machine_s, load, logger_s, signal, delay_s + way * aside) for way in (-1.0, 1.0)]
+    first, second = ends
+    if first is None or second is None:
+        return None
+    return first if abs(first.delay_s - second.delay_s) <= max(first.delay_sd_s, second.delay_sd_s) else None
+
+
+def _searched_from(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
+) -> AtCorners | None:
+    """Where a search from ``delay_s`` ends; None where fewer than two corners can be used."""
     at_corners = corners(machine_s, load)
     gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))
     sides = np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
@@ -103,4 +129,4 @@ def follow_corners(
         delay, rate = delay + float(change[0]), rate + float(change[1])
         if np.all(np.abs(change) <= SETTLED * sd):
             break
-    return delay, float(sd[0]), rate, float(sd[1])
+    return AtCorners(delay, float(sd[0]), rate, float(sd[1]))

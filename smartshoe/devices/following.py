@@ -6,7 +6,8 @@ at once, another through a first-order lag.
     r(t) = offset + g0 F(tau) + g1 w(tau) + g2 exp(-p tau),   w' = p (F - w),   tau = t + delay + rate (t - middle)
 
 Seven parameters by Gauss-Newton: offset, g0, g1, g2 (relaxation still left from before the log began), p, delay, rate.
-A lag of the sensor itself (a millisecond) stays in the delay.
+Two more for a bent characteristic, where asked for: gains of F^2 and F^3. A lag of the sensor itself (a millisecond)
+stays in the delay.
 """
 
 from __future__ import annotations
@@ -16,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.devices._corners import slope_of
+from smartshoe.devices._corners import SLOPE_OVER_S, slope_of
 
-TILT_OVER_S = 0.05  # a slope from two samples is mostly noise
 SLOW_S, QUICK_S = 0.5, 0.05
 ITERATIONS = 40
 SETTLED = 1e-2  # of a standard deviation
@@ -93,49 +93,56 @@ def _solved(design: Array, values: Array) -> tuple[Array, Array]:
     return np.linalg.lstsq(design / size, values, rcond=None)[0] / size, size
 
 
-def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: float) -> Following:
+def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: float, powers: int) -> Following:
     grid_s, pole, delay, rate = even.time_s, 1.0 / lag_s, delay_s, 0.0
+    largest = float(np.abs(even.load).max()) or 1.0
+    bends = [largest * (even.load / largest) ** power for power in range(2, powers + 1)]
     middle = 0.5 * (logger_s[0] + logger_s[-1])
     for _ in range(ITERATIONS):
         lagged = even.lagged(pole)
         at = logger_s + delay + rate * (logger_s - middle)
         inside = (at >= grid_s[0]) & (at <= grid_s[-1])
         at, values = at[inside], signal[inside]
-        since, level = at - grid_s[0], np.interp(at, grid_s, even.load)
+        since = at - grid_s[0]
         ends = np.exp(-pole * since)
-        shapes = np.column_stack([np.ones(at.size), level, np.interp(at, grid_s, lagged), ends])
+        of_load = [even.load, lagged, *bends]
+        shapes = np.column_stack([np.ones(at.size), ends, *(np.interp(at, grid_s, one) for one in of_load)])
         linear = _solved(shapes, values)[0]
-        tilt = np.interp(at, grid_s, slope_of(grid_s, linear[1] * even.load + linear[2] * lagged, TILT_OVER_S))
+        followed = np.column_stack(of_load) @ linear[2:]
+        tilt = np.interp(at, grid_s, slope_of(grid_s, followed, SLOPE_OVER_S))
         small = 1e-3
-        faster = linear[2] * (even.lagged(pole * (1.0 + small)) - lagged) / small
+        faster = linear[3] * (even.lagged(pole * (1.0 + small)) - lagged) / small
         # The last three columns belong to delay, rate and log p.
-        relaxing = np.interp(at, grid_s, faster) - linear[3] * pole * since * ends
+        relaxing = np.interp(at, grid_s, faster) - linear[1] * pole * since * ends
         design = np.column_stack([shapes, tilt, tilt * (logger_s[inside] - middle), relaxing])
         change, size = _solved(design, values - shapes @ linear)
         residual = values - shapes @ linear - design @ change
         variance = float(residual @ residual) / max(at.size - design.shape[1], 1)
         normal = (design / size).T @ (design / size)
         sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)) * variance, 0.0)) / size
-        delay = float(np.clip(delay + change[4], delay_s - LONGEST_WAY_S, delay_s + LONGEST_WAY_S))
-        rate = float(np.clip(rate + change[5], -LARGEST_RATE, LARGEST_RATE))
-        step = float(np.clip(change[6], -LARGEST_STEP, LARGEST_STEP))
+        delay = float(np.clip(delay + change[-3], delay_s - LONGEST_WAY_S, delay_s + LONGEST_WAY_S))
+        rate = float(np.clip(rate + change[-2], -LARGEST_RATE, LARGEST_RATE))
+        step = float(np.clip(change[-1], -LARGEST_STEP, LARGEST_STEP))
         pole = float(np.clip(pole * np.exp(step), 1.0 / SLOWEST_S, 1.0 / FASTEST_S))
-        if np.all(np.abs(change[4:6]) <= SETTLED * sd[4:6]):
+        if np.all(np.abs(change[-3:-1]) <= SETTLED * sd[-3:-1]):
             break
     rate_hz = 1.0 / float(np.median(np.diff(logger_s)))
     misfit = misfit_of(residual, rate_hz)
     # Noise of an interpolated load is correlated between neighbours: its spread over half seconds is what counts.
     sd *= np.sqrt(max(_of_means(residual, SLOW_S * rate_hz) / max(float(np.var(residual)), 1e-300), 1.0))
-    return Following(delay, float(sd[4]), rate, float(sd[5]), 1.0 / pole, residual, misfit)
+    return Following(delay, float(sd[-3]), rate, float(sd[-2]), 1.0 / pole, residual, misfit)
 
 
-def follow(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> Following:
+def follow(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float, powers: int = 1
+) -> Following:
     """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) behind ``load`` (m,) at ``machine_s`` (m,).
 
     The search begins at ``delay_s``; of the fits from the time constants `STARTS_S` the better one is returned.
+    ``powers``: how many powers of the load the reading follows at once; 1 is a straight characteristic.
     """
     even = _even(machine_s, load)
-    found = [_one(even, logger_s, signal, delay_s, lag_s) for lag_s in STARTS_S]
+    found = [_one(even, logger_s, signal, delay_s, lag_s, powers) for lag_s in STARTS_S]
     return min(found, key=lambda one: float(np.mean(one.residual**2)))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.devices._corners import follow_corners
-from smartshoe.devices.following import follow
+from smartshoe.devices.following import Following, follow
 from smartshoe.errors import InputError
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Channel, Recording, Role
@@ -25,16 +25,28 @@ COPY_CLOSER = 0.5  # a copy of the load fits it better than the reading does; an
 ITERATIONS = 8
 LARGEST_MISFIT = 1.5
 LONGEST_BRIDGED_STEPS = 3.5
+POWERS = 3  # of the load, for a bent characteristic
 RARE_RATE = 0.01  # between two clocks: quartz clocks differ by a ten-thousandth, a processor's own by a hundredth
 Ticks = Literal["logger", "machine"]
+By = Literal["load", "model", "corners", "curve"]
+CAVEATS: dict[By, str] = {
+    "load": "",
+    "model": ", the unit's own lag was estimated too",
+    "corners": ", and the unit does more than its model says, so the load's corners alone were used",
+    "curve": (
+        ", and the unit does more than its model says, but the load has no corners: the unit's lag and curve were"
+        " estimated too, and the error counts what the curve changes"
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
     """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle), with both sd and the correlation.
 
-    ``residual`` is the signal minus its fit, at the logger's samples that lie within the machine's log; ``by_corners``
-    tells whether delay and rate come from the load's corners alone.
+    ``residual`` is the signal minus its fit, at the logger's samples that lie within the machine's log. ``by`` tells
+    what delay and rate come from: a copy of the load, the unit's model, the load's corners alone, or the model with a
+    bent characteristic.
     """
 
     delay_s: float
@@ -43,7 +55,7 @@ class Alignment:
     rate_sd: float
     correlation: float
     residual: Array = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
-    by_corners: bool = False
+    by: By = "load"
 
     @property
     def says(self) -> str:
@@ -125,19 +137,24 @@ def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alig
 def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array) -> Alignment:
     """Delay and clock rate between a load and the reading of a unit, excluding the unit's own lag.
 
-    The unit's model is fitted together with them. Where that leaves more than noise, only the load's corners are used;
-    where the load has no corners, the reading is treated as a copy of the load. Raises `InputError` where the two do
-    not correlate.
+    The unit's model is fitted together with them. Where that leaves more than noise, only the load's corners are used.
+    Where the load has no corners, the model is fitted with a bent characteristic; the delay's sd is then at least half
+    of what the bend changes. Raises `InputError` where the two do not correlate.
     """
     delay, correlation = coarse(machine_s, load, logger_s, reading)
     _require_match(correlation)
     found = follow(machine_s, load, logger_s, reading, delay)
     if found.misfit <= LARGEST_MISFIT:
-        return Alignment(found.delay_s, found.delay_sd_s, found.rate, found.rate_sd, correlation, found.residual)
-    at_corners = follow_corners(machine_s, load, logger_s, reading, delay)
-    if at_corners is None:  # the unit's lag cannot be distinguished from a delay then, and stays part of it
-        return align(machine_s, load, logger_s, reading)
-    return Alignment(*at_corners, correlation, found.residual, True)
+        return _followed(found, found.delay_sd_s, correlation, "model")
+    if (at := follow_corners(machine_s, load, logger_s, reading, delay)) is not None:
+        return Alignment(at.delay_s, at.delay_sd_s, at.rate, at.rate_sd, correlation, found.residual, "corners")
+    bent = follow(machine_s, load, logger_s, reading, delay, POWERS)
+    changed = 0.5 * abs(bent.delay_s - found.delay_s)
+    return _followed(bent, max(bent.delay_sd_s, changed), correlation, "curve")
+
+
+def _followed(found: Following, delay_sd_s: float, correlation: float, by: By) -> Alignment:
+    return Alignment(found.delay_s, delay_sd_s, found.rate, found.rate_sd, correlation, found.residual, by)
 
 
 def join(machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger") -> Recording:
@@ -171,11 +188,7 @@ def join_with_clocks(
     except InputError as error:
         raise InputError(f"{machine_log.label} and {logger_log.label}: {error}") from error
     if copy.role == "sensor":
-        caveat += (
-            ", and the unit does more than its model says, so the load's corners alone were used"
-            if found.by_corners
-            else ", the unit's own lag was estimated too"
-        )
+        caveat += CAVEATS[found.by]
     at = found.machine_time(logger_log.time_s)
     machine_s = machine_log.time_s
     if np.array_equal(machine_s, logger_log.time_s) or abs(found.rate) > RARE_RATE:

@@ -61,7 +61,7 @@ def _errors(p: _Pressing) -> tuple[float, float, float, bool]:
     found = align_reading(p.machine_s, p.load_n, p.shoe_s, p.reading)
     inside = (p.machine_true_s > p.machine_s[0]) & (p.machine_true_s < p.machine_s[-1])
     wrong_s = float(np.abs(found.machine_time(p.shoe_s) - p.machine_true_s)[inside].max())
-    return wrong_s, 1e6 * (found.rate - p.rate), 1e6 * found.rate_sd, found.by_corners
+    return wrong_s, 1e6 * (found.rate - p.rate), 1e6 * found.rate_sd, found.by == "corners"
 
 
 @pytest.mark.parametrize(("seed", "unit"), [(1, "left_toe"), (2, "left_heel"), (3, "left_meta1")])
@@ -97,10 +97,9 @@ def test_corners_are_where_the_protocol_has_them_and_give_the_delay() -> None:
     start, _ = coarse(time_s, load_n, shoe_s, reading)
     found = follow_corners(time_s, load_n, shoe_s, reading, start)
     assert found is not None
-    delay_s, delay_sd, rate, rate_sd = found
-    assert delay_s == pytest.approx(0.2, abs=4.0 * delay_sd)
-    assert rate == pytest.approx(1e-4, abs=4.0 * rate_sd)
-    assert delay_sd < 1e-3
+    assert found.delay_s == pytest.approx(0.2, abs=4.0 * found.delay_sd_s)
+    assert found.rate == pytest.approx(1e-4, abs=4.0 * found.rate_sd)
+    assert found.delay_sd_s < 1e-3
 
 
 @pytest.mark.bank
