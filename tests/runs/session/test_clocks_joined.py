@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from smartshoe.devices import open_machine, open_shoe
 from smartshoe.devices._corners import corners, follow_corners
@@ -100,6 +101,26 @@ def test_corners_are_where_the_protocol_has_them_and_give_the_delay() -> None:
     assert found.delay_s == pytest.approx(0.2, abs=4.0 * found.delay_sd_s)
     assert found.rate == pytest.approx(1e-4, abs=4.0 * found.rate_sd)
     assert found.delay_sd_s < 1e-3
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_kinks_of_a_smooth_loads_noise_are_no_corners(seed: int) -> None:
+    """A bent unit that relaxes, under slow waves that a coarse gauge reads: an honest error, not milliseconds."""
+    rng = np.random.default_rng(seed)
+    machine_s = np.arange(0.0, 200.0, 0.02)
+    waves = [rng.uniform(0.5, 1.0) * np.sin(2.0 * np.pi * machine_s / period) for period in rng.uniform(6.0, 40.0, 4)]
+    load_n = 50.0 + 10.0 * np.sum(waves, axis=0)
+    late_s = float(rng.uniform(0.5, 1.5))
+    shoe_s = machine_s[100:-100]
+    seen = np.interp(shoe_s - late_s, machine_s, load_n)
+    relaxing = lfilter([1.0], [1.0, -np.exp(-0.02 / 8.0)], seen - seen[0]) * (1.0 - np.exp(-0.02 / 8.0))
+    reading = 0.1 * seen + 0.02 * relaxing - 1e-5 * seen**3 / 50.0 + rng.normal(0.0, 0.003, seen.size)
+    gauged = np.round(load_n + rng.normal(0.0, 0.05, load_n.size), 1)
+    found = align_reading(machine_s, gauged, shoe_s, reading)
+    assert found.by == "curve"
+    assert abs(found.delay_s + late_s) < 3.0 * found.delay_sd_s + 0.02
+    # What the corners would have said, from where the correlation is best:
+    assert follow_corners(machine_s, gauged, shoe_s, reading, coarse(machine_s, gauged, shoe_s, reading)[0]) is None
 
 
 @pytest.mark.bank
