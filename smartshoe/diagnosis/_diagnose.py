@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.diagnosis._characteristic import characteristic_of, has_two_signs
 from smartshoe.diagnosis._procedure import diagnosed
 from smartshoe.diagnosis._result import Diagnosis
-from smartshoe.diagnosis._session import without_predecessor
+from smartshoe.diagnosis._session import content_of, without_predecessor
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
@@ -18,6 +18,8 @@ from smartshoe.files.logs.accepted import RecordingLike, recordings_of, unit_of
 from smartshoe.integrity import Integrity, examine, twins
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
+
+MOST_RECORDINGS = 200  # to fit, and to judge on: a resolution, since each is a session of its own to compute
 
 
 def _silent(_: str) -> None:
@@ -58,8 +60,10 @@ def diagnose(
     fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
+    unit_of([*fitted, *kept_out], "diagnose")
+    fitted, limits_of_fitted = _spread(fitted, "to fit")
+    kept_out, limits_of_kept_out = _spread(kept_out, "to judge on")
     everything, count = [*fitted, *kept_out], len(fitted)
-    unit_of(everything, "diagnose")
     decided = decided_by(thresholds, material)
     integrity, shared = examine(everything, decided, count), twins(everything, decided)
     everything = [*integrity.recordings]
@@ -80,11 +84,30 @@ def diagnose(
     reasons = tuple(left_out.values())
     why_not = (*reasons, *(one.says for k, one in shared.items() if k not in left_out))
     limits = (
+        *limits_of_fitted,
+        *limits_of_kept_out,
         *(f"left out: {why}" for why in why_not),
         *_limit_missing_predecessor(everything, count, left_out),
         *found.limits,
     )
     return replace(found, limits=limits, left_out=reasons)
+
+
+def _spread(recordings: list[Recording], purpose: str) -> tuple[list[Recording], list[str]]:
+    """At most `MOST_RECORDINGS` of the ``recordings``, evenly spread over their contents, and the sentence on the rest.
+
+    Recordings stay in their order, which, like their names, does not decide which are taken.
+    """
+    if len(recordings) <= MOST_RECORDINGS:
+        return recordings, []
+    by_content = sorted(range(len(recordings)), key=lambda k: content_of(recordings[k]))
+    places = np.linspace(0, len(recordings) - 1, MOST_RECORDINGS).round().astype(int)
+    taken = sorted(by_content[place] for place in places)
+    said = (
+        f"of {len(recordings):,} recordings {purpose} {MOST_RECORDINGS} are used, evenly spread over their lengths and"
+        " loads, since each is a session of its own (write short ones that follow each other as one recording)"
+    )
+    return [recordings[k] for k in taken], [said]
 
 
 def _pulled_reason(recording: Recording, thresholds: Thresholds) -> str | None:

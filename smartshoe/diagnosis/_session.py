@@ -166,7 +166,7 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
     Names only tell which continues which: a renamed file is the same data.
     """
     order: list[int] = []
-    waiting = sorted(range(len(recordings)), key=lambda k: _content(recordings[k]))
+    waiting = sorted(range(len(recordings)), key=lambda k: content_of(recordings[k]))
     while waiting:
         names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
         ready = [k for k in waiting if names[_predecessor(recordings[k])] <= continues(recordings[k], recordings[k])]
@@ -176,7 +176,7 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
     return order
 
 
-def _content(recording: Recording) -> tuple[float, ...]:
+def content_of(recording: Recording) -> tuple[float, ...]:
     """Length, duration and mean load and reading: numbers that order recordings alike in any unit."""
     means = (float(np.mean(one.si)) for one in (recording.load, recording.sensor))
     return recording.time_s.size, recording.duration_s, *means

@@ -70,21 +70,22 @@ def _solid(load: Array) -> Array:
     return np.array(out)
 
 
-def _recorded(name: str, load: Array, rng: np.random.Generator) -> Recording:
+def _recorded(name: str, load: Array, rng: np.random.Generator, zero_mbar: float = 0.0) -> Recording:
     read = _solid(load)
     bent = np.where(read > LEVEL, LEVEL + (1.0 - SLOPE_LOST) * (read - LEVEL), read)[::THINNED]
     force_n = FULL_N * (load[::THINNED] + 2e-4 * rng.standard_normal(bent.size))
-    pressure_mbar = FULL_MBAR * (bent + 5e-4 * rng.standard_normal(bent.size))
+    pressure_mbar = zero_mbar + FULL_MBAR * (bent + 5e-4 * rng.standard_normal(bent.size))
     time_s = THINNED * STEP_S * np.arange(bent.size)
     return Recording.from_arrays(name=name, time_s=time_s, force_n=force_n, pressure_mbar=pressure_mbar)
 
 
-@pytest.fixture(scope="module")
-def told() -> tuple[Diagnosis, Recording]:
+@pytest.fixture(scope="module", params=[0.0, 90.0], ids=["zeroed", "not zeroed"])
+def told(request: pytest.FixtureRequest) -> tuple[Diagnosis, Recording]:
     """The diagnosis, and what was held out."""
-    rng = np.random.default_rng(3)
-    fitted = [_recorded(name, load, rng) for name, load in (("triangles", _triangles()), ("holds", _holds()))]
-    held = _recorded("mixed", _mixed(rng), rng)
+    rng, zero_mbar = np.random.default_rng(3), request.param
+    loads = {"triangles": _triangles(), "holds": _holds()}
+    fitted = [_recorded(name, load, rng, zero_mbar) for name, load in loads.items()]
+    held = _recorded("mixed", _mixed(rng), rng, zero_mbar)
     return diagnose(fitted, hold_out=held), held
 
 

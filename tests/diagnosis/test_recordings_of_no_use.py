@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
+from smartshoe.diagnosis._diagnose import _spread
 from smartshoe.errors import UnitError, UsageError
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
@@ -181,3 +182,17 @@ def test_recordings_of_several_units_are_refused_by_the_units_names(hold_out: bo
     # What says nothing of its unit may be of any.
     assert diagnose(left, hold_out=OTHER).verdict == "adequate"
     assert diagnose(left, hold_out=replace(OTHER, unit="left toe")).verdict == "adequate"
+
+
+def test_of_very_many_recordings_those_that_are_used_do_not_hang_on_their_order(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Six short ones, of which three are used: the shortest, the longest, and one between."""
+    monkeypatch.setattr("smartshoe.diagnosis._diagnose.MOST_RECORDINGS", 3)
+    given = [OTHER.taken(slice(0, 300 * (k + 4))) for k in range(6)]
+    given = [Recording(one.time_s, one.channels, name=f"part {k}") for k, one in enumerate(given)]
+    assert [one.name for one in _spread(given, "to fit")[0]] == ["part 0", "part 2", "part 5"]
+    assert [one.name for one in _spread(given[::-1], "to fit")[0]] == ["part 5", "part 2", "part 0"]
+    found = diagnose(given, hold_out=GOOD)
+    assert found.verdict == "adequate"
+    assert [one[:33] for one in found.limits if "are used" in one] == ["of 6 recordings to fit 3 are used"]

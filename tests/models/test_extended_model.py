@@ -53,6 +53,15 @@ def test_an_effect_at_null_leaves_the_chain_as_it_is(name: str) -> None:
     assert_allclose(with_null.simulate(at), baseline().simulate(at), atol=1e-12)
 
 
+@given(st.sampled_from([name for name in NAMES if name != "zero_offset"]), st.floats(-0.5, 0.5))
+def test_a_zero_moves_any_reading_by_itself(name: str, zero: float) -> None:
+    """A fit leaves each recording its own offset, so what a curve or a rail was fitted to has none."""
+    at = conditions()
+    model = baseline().with_part(effect(name), values_of(name))
+    moved = model.with_part(effect("zero_offset"), np.array([zero]))
+    assert_allclose(moved.simulate(at), model.simulate(at) + model.gain * zero, atol=1e-12)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_model_survives_its_file(name: str) -> None:
     model = baseline().with_part(effect(name), values_of(name))

@@ -26,7 +26,7 @@ class Saturation(Effect):
 
     And max(P, 0) with the weight ``rail``, for a sensor whose membrane does not follow a pressure below zero. Where
     more than half of the slope is lost above the level, what was clipped is lost, and there is no inverse; with less it
-    is a bend, which is undone. The block comes after the sensor's zero and gain, as rails do. With a level far below
+    is a bend, which is undone. The block comes after the sensor's drifts and gain, as rails do. With a level far below
     the top or a wide knee it would be a curve like any other: the bounds leave those to other blocks.
     """
 
@@ -39,7 +39,16 @@ class Saturation(Effect):
         EffectParameter(
             "slope_lost", "1", "share of the slope lost above the level", 0.0, 0.0, 1.0, 0.1, natural="both"
         ),
-        EffectParameter("level", "FS_reading", "reading where it begins", None, 0.55, 1.5, 0.1, kind_ends="lower"),
+        EffectParameter(
+            "level",
+            "FS_reading",
+            "where it begins, from the reading without load on",
+            None,
+            0.55,
+            1.5,
+            0.1,
+            kind_ends="lower",
+        ),
         EffectParameter(
             "knee", "FS_reading", "half width of the transition", None, 1e-3, 0.08, 0.01, kind_ends="upper"
         ),

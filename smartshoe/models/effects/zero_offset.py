@@ -9,9 +9,9 @@ from smartshoe.models.effects.exposure import by
 
 
 class ZeroOffset(Effect):
-    """+ b, whatever the load."""
+    """+ b, whatever the load: the last of the chain, since curves and rails are fitted to readings without offset."""
 
-    name, family, stage, place = "zero_offset", "zero", "sensor", "sensor"
+    name, family, stage, place = "zero_offset", "zero", "sensor", "logger"
     says = "the reading is shifted by a constant, with and without load"
     parameters = (EffectParameter("offset", "FS_reading", "shift of the reading", 0.0, -0.5, 0.5, 0.01),)
     exposed_by = by("rests")
