@@ -85,6 +85,11 @@ def significant(value: float | None, digits: int = 4) -> str:
     return "–" if value is None or value != value else f"{value:.{digits}g}"
 
 
+def rounded(value: float, digits: int = 2) -> str:
+    """``value`` to ``digits`` significant digits, without an exponent up to a million."""
+    return f"{float(f'{value:.{digits}g}'):,g}"
+
+
 def percent(share: float, *, signed: bool = False) -> str:
     """A share in percent to two digits; of a hundred and more, to whole numbers."""
     value = 100.0 * share

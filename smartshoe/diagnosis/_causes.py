@@ -17,7 +17,7 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
-from smartshoe.models.effects import catalogue, in_words
+from smartshoe.models.effects import catalogue, in_words, listed
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.signals.noise import NORMAL_95
 
@@ -43,6 +43,7 @@ def cause_of(
         *_nearest_rival(rivals, name.equivalents),
         *_how_sure(name, law, rivals, found, thresholds),
         *_missed_by_law(law, name, thresholds),
+        *_beside_kin(name),
         *_missing_excitation(name, excitation),
     )
     by = None if law is None else law.fit
@@ -128,6 +129,18 @@ def _missed_by_law(law: Alternative | None, name: Name, thresholds: Thresholds) 
         " model keeps the free form, and the parameters are the equation's"
     )
     return [Statement("share of its kind that the law misses in percent", missed, most, says)]
+
+
+def _beside_kin(name: Name) -> list[Statement]:
+    """The other members of its kind that the extended model has."""
+    kin = name.member.kin
+    if not kin:
+        return []
+    says = (
+        f"the extended model has {listed(kin)} beside it, of one kind with it: either takes"
+        " most of the other's part, so that size, gain and fall are of all of them together"
+    )
+    return [Statement("other effects of its kind in the model", float(len(kin)), 0.0, says)]
 
 
 def _missing_excitation(name: Name, excitation: Excitation) -> list[Statement]:

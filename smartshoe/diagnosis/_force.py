@@ -12,9 +12,10 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_terms_of
+from smartshoe.diagnosis._scale import Scale, reading_in
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._zero import mean_offset
-from smartshoe.display import percent
+from smartshoe.display import percent, rounded
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import in_words, listed
 from smartshoe.models.extended import ExtendedModel
@@ -214,24 +215,51 @@ def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[s
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
             return []
         return [
-            f"the force of {name} is off by {_rounded(worst_n)} N (rms): the {_rounded(held_n)} N of what is held out"
+            f"the force of {name} is off by {rounded(worst_n)} N (rms): the {rounded(held_n)} N of what is held out"
             " do not hold for loads as it has"
         ]
     return [
         "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
-        f" {name} is off by {_rounded(worst_n)} N (rms); with its own zero, and what it bore before, allowed for it"
-        f" would be {_rounded(stated_n)} N (zero the load cell and the sensor before each recording, and begin it with"
+        f" {name} is off by {rounded(worst_n)} N (rms); with its own zero, and what it bore before, allowed for it"
+        f" would be {rounded(stated_n)} N (zero the load cell and the sensor before each recording, and begin it with"
         " a rest)"
     ]
 
 
-def _rounded(force_n: float) -> str:
-    """A force in N to two digits, without an exponent."""
-    return f"{float(f'{force_n:.2g}'):,g}"
+def limit_unsound_readings(found: Compensation, scale: Scale, thresholds: Thresholds) -> list[str]:
+    """The sentence where a filter that remembers takes readings that were left out, such as spikes, for loads.
+
+    The stated errors are of readings without them. A stream has them, and what they leave behind is in sound samples.
+    """
+    model, there = found.model, [one for one in found.fine if one.usable.any() and not one.usable.all()]
+    with_n = [_rms([_force_error_n(one, model, _as_logged(one, scale))], [one.usable]) for one in there]
+    if not there:
+        return []
+    worst = max(range(len(there)), key=with_n.__getitem__)
+    without_n = _rms([_force_error_n(there[worst], model)], [there[worst].usable])
+    if with_n[worst] <= thresholds.clear * max(without_n, thresholds.tolerable * model.full_scale_load_n):
+        return []
+    return [
+        "a filter remembers samples that are no readings (they are left out here) as if they were loads: with them the"
+        f" force of {there[worst].recording.name} is off by {rounded(with_n[worst])} N (rms) in its sound samples,"
+        f" without by {rounded(without_n)} N (take them out before the filter: a median of three samples does for"
+        " single ones)"
+    ]
 
 
-def _force_error_n(session: Session, model: ExtendedModel) -> Array:
+def _as_logged(session: Session, scale: Scale) -> Array:
+    """(n,) the reading with the samples that are not usable as they were logged, a share of full scale."""
+    recording = session.recording
+    present = recording.sensor.present
+    time_s = recording.time_s[present] - recording.time_s[0]
+    logged = np.interp(session.conditions.time_s, time_s, scale.share(reading_in(recording, scale.unit)[present]))
+    return np.where(session.usable, session.reading, logged)
+
+
+def _force_error_n(session: Session, model: ExtendedModel, reading: Array | None = None) -> Array:
     """(n,) compensated force less load in N, with the recording's own offset and past removed from the reading.
+
+    ``reading`` (n,): another one to compensate, with the same offset and past.
 
     The past includes what earlier recordings, which it continues, did to the unit; their clock runs on, and a
     compensator can be told its start.
@@ -244,7 +272,8 @@ def _force_error_n(session: Session, model: ExtendedModel) -> Array:
     if session.conditions.before:
         rested = replace(session.conditions, before={"time_s": started_s}, earlier=np.zeros(0), cache={})
         own = own + read - undone.simulate(rested)
-    return _error_without_own_n(session, model, compensator, own)
+    compensated = session if reading is None else replace(session, reading=reading)
+    return _error_without_own_n(compensated, model, compensator, own)
 
 
 def _beside_zero(model: ExtendedModel, compensator: ExtendedCompensator) -> ExtendedModel:

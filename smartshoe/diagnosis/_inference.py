@@ -29,7 +29,7 @@ from smartshoe.diagnosis._gains_and_zeros import (
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier_changes, with_laws
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit
-from smartshoe.diagnosis._members import Member, members_of
+from smartshoe.diagnosis._members import Member, members_of, taken_together
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._search import BREADTH, best_additions
@@ -58,6 +58,8 @@ class Inference:
     ``baseline`` and ``fit`` are the plain and the extended model, each with the likelihood that it was fitted by.
     ``members`` are the effects of the extended model, largest first.
 
+    ``together``: members that are of one kind, taken as one (`taken_together`).
+
     ``screening`` is the fall of the baseline's score for each of the strongest effects alone, and ``likeness`` (k, k)
     how similar these k effects look (`Evidence.likeness`). ``refused`` are effects that cross-validation removed.
     ``cancelling_names`` are members that cancel one another, so that none of them is named.
@@ -82,6 +84,7 @@ class Inference:
     nearest_law: tuple[Effect, float, float] | None = None
     own_gains: tuple[OwnGain, ...] = ()
     zero_changes: tuple[ZeroChange, ...] = ()
+    together: tuple[Member, ...] = ()
 
 
 def infer_with_gas_check(
@@ -165,6 +168,7 @@ def infer(
         cancelling_names=found.cancelling_names,
         best_single=best_single,
         nearest_law=nearest_law,
+        together=taken_together(members, found.evidence, found.best, found.fit),
     )
 
 
@@ -186,6 +190,7 @@ def _with_own_terms(
         fit=evaluated(conditional.fit.likelihood, plain.model),
         members=(),
         best_single=None,
+        together=(),
     )
 
 

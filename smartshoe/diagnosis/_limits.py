@@ -24,7 +24,7 @@ from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import rms_difference
 from smartshoe.diagnosis._zero import OwnZeros, Zero
-from smartshoe.display import percent
+from smartshoe.display import percent, rounded
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect, in_words, listed
@@ -337,13 +337,13 @@ def limit_own_zeros(zeros: OwnZeros | None, scale: Scale) -> list[str]:
     low, high = (int(of(zeros.offsets)) for of in (np.argmin, np.argmax))
 
     def told(at: int) -> str:
-        share = float(zeros.offsets[at])
-        of_scale = f"{percent(share, signed=True)} of full scale"
-        return f"{scale.zero + share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
+        value = scale.zero + float(zeros.offsets[at]) * scale.reading
+        return f"{rounded(value, 4)} {scale.unit.symbol} in {zeros.names[at]}"
 
+    apart = percent(float(np.ptp(zeros.offsets)))
     return [
-        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: this is allowed"
-        " for here (zero the load cell and the sensor before each)"
+        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}, {apart} of full"
+        " scale apart: this is allowed for here (zero the load cell and the sensor before each)"
     ]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +52,8 @@ class Member:
     the rms by which the other members' equations depart. ``likeness`` is the largest cosine between its contribution
     and that of another member, at least 0.
 
+    ``kin`` are members of its kind that ``size``, ``fall`` and ``without`` take together with it (`taken_together`).
+
     ``is_at_end_of_kind``: a shape lies where the effect turns into one of another kind. ``bends_too_little``: it is a
     curve at the end of its range.
     """
@@ -67,6 +70,7 @@ class Member:
     is_at_end_of_kind: bool = False
     confounded: tuple[Alternative, ...] = ()
     bends_too_little: bool = False
+    kin: tuple[str, ...] = ()
 
     @property
     def is_any_curve(self) -> bool:
@@ -120,6 +124,50 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))
+
+
+def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Member, ...]:
+    """For each kind of which there are several ``members``, these as one, called by the largest.
+
+    Where a delay stands beside a clock drift either takes most of the other's part, so that each alone does little,
+    while what both do may be the largest cause of all.
+    """
+    likelihood, departure = extended.likelihood, evidence.thresholds.departure
+    whole, made = _residuals(likelihood, extended), []
+    for kind in dict.fromkeys(one.effect.kind for one in members):
+        own = [one for one in members if one.effect.kind == kind]
+        others = [one for one in members if one.effect.kind != kind]
+        if len(own) < 2:
+            continue
+        largest = max(own, key=lambda one: (not one.effect.is_flexible, one.size))
+        without = fit(likelihood, extended.model.without(*(one.name for one in own)), FEW_STEPS)
+        added = [_residuals(likelihood, one) - whole for one in (without, *(other.without for other in others))]
+        inner = np.array(added) @ np.array(added).T
+        left = tuple(m for m in best.members if evidence.linearisation.candidates[m].effect.kind != kind)
+        made.append(
+            replace(
+                largest,
+                size=float(np.sqrt(inner[0, 0] / max(whole.size, 1))),
+                fall=without.cost - extended.cost,
+                without=without,
+                alternatives=(Alternative(None, _margin_to(left, evidence, best)),),
+                others_departure_rms=departure * math.hypot(*(one.departure_sds * one.size for one in others)),
+                likeness=max([0.0, *cosines(inner)[0, 1:].tolist()]),
+                kin=tuple(one.name for one in own if one is not largest),
+            )
+        )
+    return tuple(made)
+
+
+def _margin_to(reduced: tuple[int, ...], evidence: Evidence, best: Posterior) -> float:
+    """By how much the set ``reduced`` has less evidence than ``best``: the smallest of three margins.
+
+    With the model error of the search and the two wider ones (`Evidence`).
+    """
+    return min(
+        weighed.posterior(reduced, of_any_law=wider).score - weighed.posterior(best.members, of_any_law=wider).score
+        for weighed, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))
+    )
 
 
 def _residuals(likelihood: Likelihood, found: Fit) -> Array:
@@ -216,17 +264,9 @@ def start_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int) -> tuple[Alternative, ...]:
-    """What could stand in a member's place, nearest first: every other effect at its best shape, or nothing.
-
-    The margin to nothing is the smallest of three, with the model error of the search and the two wider ones
-    (`Evidence`).
-    """
+    """What could stand in a member's place, nearest first: every other effect at its best shape, or nothing."""
     reduced = best.without(member)
-    margins = [
-        weighed.posterior(reduced, of_any_law=wider).score - weighed.posterior(best.members, of_any_law=wider).score
-        for weighed, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))
-    ]
-    found = [Alternative(None, min(margins))]
+    found = [Alternative(None, _margin_to(reduced, evidence, best))]
     for k in best_additions(evidence, reduced, 2 * BREADTH):
         one = evidence.linearisation.candidates[k]
         if one.name == evidence.linearisation.candidates[member].name or one.effect.is_flexible:

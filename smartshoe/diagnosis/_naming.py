@@ -45,6 +45,7 @@ def names_of(
     is_clocked: bool = False,
     is_unsteady: bool = False,
     best_single: Effect | None = None,
+    together: Sequence[Member] = (),
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``residual_rms`` is the structure that no member explains.
 
@@ -54,6 +55,9 @@ def names_of(
     * If none is sure: those that cannot be ruled out and exceed ``residual_rms``; failing these, one of the kind of
       ``best_single``, if it cannot be ruled out. Each is half sure at most.
 
+    ``together``: members of one kind as one; where none of them is sure by itself but all of them are, they have one
+    name, with the others as its equivalents.
+
     ``is_clocked``: peak loads rise or fall with time, so that effects that go with time imitate each other and curves;
     these are half sure at most. So is any memory effect together with a curve at the end of its range, since it may be
     what that curve misses. ``is_unsteady``: zeros jump, and unseen jumps may imitate any effect, so that all are half
@@ -61,6 +65,10 @@ def names_of(
     given twice.
     """
     named = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
+    for joint in (_named(one, residual_rms, thresholds) for one in together):
+        kin = {joint.member.name, *joint.member.kin}
+        if joint.is_sure and not any(one.is_sure for one in named if one.member.name in kin):
+            named = [*(one for one in named if one.member.name not in kin), _with_kin(joint)]
     named = [_with_confounded(name, thresholds) for name in named]
     is_bent = any(one.bends_too_little for one in members)
     named = [
@@ -120,6 +128,13 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
     kin = tuple(name for name in others if name not in ruled_out)
     return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
+
+
+def _with_kin(name: Name) -> Name:
+    """The name of members taken together: any of them may be the law, or several."""
+    kin = [one for one in name.member.kin if one in catalogue()]
+    law = min(name.law_probability, 1.0 / (1.0 + len(kin)))
+    return replace(name, law_probability=law, equivalents=tuple(dict.fromkeys((*name.equivalents, *kin))))
 
 
 def _with_confounded(name: Name, thresholds: Thresholds) -> Name:

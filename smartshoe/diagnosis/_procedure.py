@@ -19,6 +19,7 @@ from smartshoe.diagnosis._force import (
     limit_force,
     limit_latency_left,
     limit_not_undone,
+    limit_unsound_readings,
 )
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_terms_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer_with_gas_check
@@ -118,7 +119,8 @@ def diagnosed(
         thresholds.material,
         structures.within.memory,
     )
-    parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
+    parts = {cause.name for cause in causes}
+    parts |= {part for name in named.names for part in (name.member.name, *name.member.kin)}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
     parameters, covariance = joint_parameters(adopted.fit, scale)
     force = compensation(fine, adopted.model, plain, thresholds)
@@ -376,6 +378,7 @@ def _limits_of_the_force(
         *limit_own_gains(found.own_gains),
         *limit_own_zeros(own_zero_offsets, given.scale),
         *limit_calibration_off(force, thresholds),
+        *limit_unsound_readings(force, given.scale, thresholds),
         *limit_zero_jumps(found.zero_changes),
     )
 

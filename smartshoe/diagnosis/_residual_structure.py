@@ -96,7 +96,9 @@ def residual_structure(
     memory = gauss_markov_of(sessions, residuals, thresholds)
     says = worst_place(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
-        says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
+        stay_s = 2.0 * memory.tau_s
+        stays = f"for about {stay_s:.2g} s" if math.isfinite(stay_s) else "for longer than these recordings can tell"
+        says = f"it switches between two levels and stays at each {stays}; {says}"
     repeats = repeating_structure(sessions, residuals, thresholds)
     if quick is not None and quick.significant and quick.rms > repeats.rms:
         repeats = quick

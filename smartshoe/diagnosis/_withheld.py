@@ -105,6 +105,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
     limits: tuple[str, ...] = ()
     unnamed_rms = 0.0
     while True:
+        left = {one.name for one in members}
         names = names_of(
             members,
             residual_rms,
@@ -112,6 +113,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
             is_clocked=given.excitation.goes_with_the_clock,
             is_unsteady=bool(found.zero_changes),
             best_single=found.best_single,
+            together=[one for one in found.together if {one.name, *one.kin} <= left],
         )
         if not names and found.best_single is not None:
             # The best single effect does not depend on effects that cancel it.

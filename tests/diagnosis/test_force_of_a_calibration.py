@@ -17,7 +17,6 @@ from smartshoe.diagnosis import Thresholds, _force
 from smartshoe.diagnosis._force import (
     Compensation,
     ForceError,
-    _rounded,
     compensation,
     force_error,
     limit_calibration_off,
@@ -26,10 +25,13 @@ from smartshoe.diagnosis._force import (
     limit_force,
     limit_latency_left,
     limit_not_undone,
+    limit_unsound_readings,
 )
 from smartshoe.diagnosis._procedure import _with_held_drifts
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._scale import full_scale
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._zero import mean_offset
+from smartshoe.display import rounded
 from smartshoe.models.effects import effect
 from smartshoe.models.effects.saturation import MOST_LOST
 from smartshoe.models.extended import ExtendedModel
@@ -235,6 +237,26 @@ def test_a_lag_that_is_undone_in_part_and_loads_that_feel_it_are_told(one: Sessi
         assert limit_calibration_off(replace(found, error=ForceError(0.0, held_n)), STANDARD) == []
 
 
+@pytest.mark.parametrize(("name", "remembers"), [("mullins_softening", True), ("gas_compression", False)])
+def test_a_spike_that_a_filter_remembers_is_told(name: str, remembers: bool) -> None:
+    """One sample of twice the load before the first cycle: all that follow are read as of a wall that it softened."""
+    model = MODEL.with_part(name, effect(name).start({}) + np.eye(1, len(effect(name).parameters))[0] * 0.1)
+    clean = recording(model, noise=0.0)
+    at = int(np.argmax(clean.force_n > 100.0)) - 5
+    spiked = clean.sensor.values + np.where(np.arange(len(clean)) == at, 2.0 * model.full_scale_reading, 0.0)
+    logged = clean.with_channel(replace(clean.sensor, values=spiked))
+    sound = np.arange(len(clean)) != at
+    scale = full_scale([logged], [sound], STANDARD)
+    fine = prepare([logged], [sound], [False], scale, [1], STANDARD)
+    model = replace(model, full_scale_reading=scale.reading, gain=model.gain * model.full_scale_reading / scale.reading)
+    found = compensation(fine, model, model, STANDARD)
+    said = limit_unsound_readings(found, scale, STANDARD)
+    assert len(said) == remembers
+    assert not remembers or said[0].startswith("a filter remembers samples that are no readings")
+    whole = prepare([clean], [sound | True], [False], scale, [1], STANDARD)
+    assert limit_unsound_readings(replace(found, fine=whole), scale, STANDARD) == []
+
+
 @pytest.mark.parametrize(
     ("name", "values"), [("zero_drift", [0.001, 0.0, 60.0, 1.0]), ("gain_drift", [0.0005, 0.0, 60.0, 0.0, 1.0])]
 )
@@ -275,4 +297,4 @@ def test_a_compensator_undoes_all_but_what_it_passes_over(one: Session) -> None:
 
 @pytest.mark.parametrize(("force_n", "said"), [(0.0384, "0.038"), (3.3, "3.3"), (149.6, "150"), (1234.0, "1,200")])
 def test_a_force_is_said_to_two_digits_without_an_exponent(force_n: float, said: str) -> None:
-    assert _rounded(force_n) == said
+    assert rounded(force_n) == said
