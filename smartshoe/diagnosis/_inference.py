@@ -168,7 +168,7 @@ def infer(
         cancelling_names=found.cancelling_names,
         best_single=best_single,
         nearest_law=nearest_law,
-        together=taken_together(members, found.evidence, found.best, found.fit),
+        together=found.together(members),
     )
 
 
@@ -238,6 +238,10 @@ class _Validated:
     def members(self) -> tuple[Member, ...]:
         """Each effect, weighed against its alternatives."""
         return members_of(self.evidence, self.best, self.fit)
+
+    def together(self, members: Sequence[Member]) -> tuple[Member, ...]:
+        """Those of the ``members`` that are of one kind, taken as one."""
+        return taken_together(members, self.evidence, self.best, self.fit)
 
 
 def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Validated:

@@ -17,6 +17,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, row
 from smartshoe.diagnosis._search import BREADTH, RIVALS, best_additions, is_admissible
 from smartshoe.diagnosis._sensitivity import Candidate, available_effects, cosines, logged_channels
 from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._validation import contributed_rms, do_cancel
 from smartshoe.models.effects import Effect, blocks, catalogue, told_apart_by
 from smartshoe.models.extended import ExtendedModel
 
@@ -130,17 +131,18 @@ def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterio
     """For each kind of which there are several ``members``, these as one, called by the largest.
 
     Where a delay stands beside a clock drift either takes most of the other's part, so that each alone does little,
-    while what both do may be the largest cause of all.
+    while what both do may be the largest cause of all. Not those that undo one another, which follow what neither is.
     """
     likelihood, departure = extended.likelihood, evidence.thresholds.departure
     whole, made = _residuals(likelihood, extended), []
     for kind in dict.fromkeys(one.effect.kind for one in members):
         own = [one for one in members if one.effect.kind == kind]
         others = [one for one in members if one.effect.kind != kind]
-        if len(own) < 2:
+        names = [one.name for one in own]
+        if len(own) < 2 or do_cancel(*contributed_rms(likelihood.sessions, extended.model, names), evidence.thresholds):
             continue
         largest = max(own, key=lambda one: (not one.effect.is_flexible, one.size))
-        without = fit(likelihood, extended.model.without(*(one.name for one in own)), FEW_STEPS)
+        without = fit(likelihood, extended.model.without(*names), FEW_STEPS)
         added = [_residuals(likelihood, one) - whole for one in (without, *(other.without for other in others))]
         inner = np.array(added) @ np.array(added).T
         left = tuple(m for m in best.members if evidence.linearisation.candidates[m].effect.kind != kind)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -208,18 +208,29 @@ def extrapolating_effect(sessions: Sequence[Session], model: ExtendedModel, thre
 
 
 def cancelling_effects(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> list[str]:
-    """Effects that cancel one another: each moves the reading by at least nearly as much as all of them together.
-
-    Powers of independent effects add up to that of their sum. Where they clearly exceed it the effects fit by their
-    difference, which is neither's.
-    """
-    seen = [one.fitted for one in sessions]
-    whole = [model.simulate(one.conditions) for one in sessions]
-    sizes = {name: _centred_rms(_contributions(sessions, whole, model.without(name)), seen) for name in model.names}
-    together = _centred_rms(_contributions(sessions, whole, replace(model, parts=())), seen)
-    if sum(size**2 for size in sizes.values()) <= thresholds.clear * together**2:
+    """Effects that cancel one another: each moves the reading by at least nearly as much as all of them together."""
+    sizes, together = contributed_rms(sessions, model, model.names)
+    if not do_cancel(sizes, together, thresholds):
         return []
     return [name for name, size in sizes.items() if size > (1.0 - thresholds.same) * together]
+
+
+def contributed_rms(
+    sessions: Sequence[Session], model: ExtendedModel, names: Sequence[str]
+) -> tuple[dict[str, float], float]:
+    """The rms by which each of the effects ``names`` moves the reading, and by which all of them together do."""
+    seen = [one.fitted for one in sessions]
+    whole = [model.simulate(one.conditions) for one in sessions]
+    sizes = {name: _centred_rms(_contributions(sessions, whole, model.without(name)), seen) for name in names}
+    return sizes, _centred_rms(_contributions(sessions, whole, model.without(*names)), seen)
+
+
+def do_cancel(sizes: Mapping[str, float], together: float, thresholds: Thresholds) -> bool:
+    """Whether effects of rms ``sizes`` fit by their difference, which is neither's; ``together`` is all effects' rms.
+
+    Powers of independent effects add up to that of their sum; here they clearly exceed it.
+    """
+    return sum(size**2 for size in sizes.values()) > thresholds.clear * together**2
 
 
 def error_of(sessions: Sequence[Session], model: ExtendedModel) -> float:

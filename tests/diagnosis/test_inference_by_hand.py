@@ -92,6 +92,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         model.parts = told.parts.get(one.name, ())
         return SimpleNamespace(
             members=lambda: told.members,
+            together=lambda members: (tuple(members), "together"),
             fit=SimpleNamespace(model=model, likelihood="likelihood"),
             evidence="evidence",
             refused=told.refused.get(one.name, ()),
@@ -315,15 +316,17 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
         fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))),
-        cancelling_names=(), members=lambda: ("curve",),
+        cancelling_names=(), members=lambda: ("curve",), together=lambda members: "a curve alone",
     )  # fmt: skip
     flow.best_single = "a curve", judged
     found = flow.infer()
     assert (found.best_single, found.fit, found.members) == ("a curve", judged.fit, ("curve",))
+    assert found.together == "a curve alone"
     assert found.refused == ("b",)
     flow.parts = {"settled first": (part, part)}
     found = flow.infer()
     assert (found.best_single, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
+    assert found.together == (flow.members, "together")
     flow.members = (_Sure(0.1), _Sure(least))
     assert flow.infer().best_single is None
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
+from test_diagnosis_parts import recording, sessions_of
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
-from smartshoe.diagnosis._members import Member
+from smartshoe.diagnosis._members import Member, taken_together
 from smartshoe.diagnosis._naming import names_of
+from smartshoe.diagnosis._validation import contributed_rms, do_cancel
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -52,6 +56,20 @@ def test_one_that_is_sure_alone_keeps_its_name_and_its_size() -> None:
 def test_two_that_undo_each_other_have_no_name() -> None:
     named = names_of([LARGE, *SMALL], LEFT, STANDARD, together=[replace(BOTH, size=5e-4)])
     assert [one.member for one in named] == [LARGE]
+
+
+@pytest.mark.parametrize(("delay_s", "cancels"), [(0.05, False), (-0.05, True)])
+def test_those_that_undo_each_other_are_not_taken_together(delay_s: float, cancels: bool) -> None:
+    """A reading that is late by a lag and early by a delay, as friction that goes with the velocity is followed."""
+    model = MODEL.with_part("sensor_lag", [0.05, 0.0]).with_part("delay", [delay_s])
+    sessions, _ = sessions_of(recording())
+    sizes, together = contributed_rms(sessions, model, model.names)
+    assert do_cancel(sizes, together, STANDARD) is cancels
+    if cancels:
+        extended = Fit(model, 0.0, Likelihood(sessions, 0.001, MODEL, STANDARD))
+        unasked: Any = SimpleNamespace(thresholds=STANDARD)
+        members = [_member("sensor_lag", 6e-4), _member("delay", 4e-4)]
+        assert taken_together(members, unasked, unasked, extended) == ()
 
 
 # -- a unit: a reading that falls behind, a contact that settles, friction ----------------------------------------

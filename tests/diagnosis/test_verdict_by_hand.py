@@ -366,8 +366,8 @@ class _Moving:
     def names(self) -> tuple[str, ...]:
         return tuple(name for name, _ in self.parts)
 
-    def without(self, name: str) -> _Moving:
-        return _Moving(tuple(part for part in self.parts if part[0] != name))
+    def without(self, *names: str) -> _Moving:
+        return _Moving(tuple(part for part in self.parts if part[0] not in names))
 
     def simulate(self, conditions: None) -> Any:
         return 3.0 + sum(size for _, size in self.parts) * np.resize([1.0, -1.0], 40)
