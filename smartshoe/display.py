@@ -13,14 +13,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_NAMES = 10  # column names in a sentence
+MOST_NAMES, MOST_LETTERS = 10, 90  # column names in a sentence, and their letters, so that it keeps its end
+LONGEST_NAME = 60  # letters of a name in a sentence; of a longer one, half of them from each end
 SUREST = 0.99  # largest probability given in percent
 
 
 def first_names(names: Sequence[str]) -> str:
-    """The names as text, at most `MOST_NAMES` of them, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    """The first of the names as text, at most `MOST_NAMES` and about `MOST_LETTERS`, and how many more there are."""
+    shown: list[str] = []
+    for name in names[:MOST_NAMES]:
+        short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME // 2]}...{name[-LONGEST_NAME // 2 :]}"
+        if shown and len(", ".join([*shown, short])) > MOST_LETTERS:
+            break
+        shown.append(short)
+    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    return ", ".join(shown) + more
 
 
 @dataclass(frozen=True, slots=True)

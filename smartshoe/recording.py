@@ -252,7 +252,7 @@ class Recording(Summarised):
             return self.channels[name]
         except KeyError:
             raise MissingChannelError(
-                f"{self.label} has no channel {name!r}; it has {', '.join(self.channels) or 'none'}"
+                f"{self.label} has no channel {name!r}; it has {first_names(list(self.channels)) or 'none'}"
             ) from None
 
     @property
@@ -338,7 +338,7 @@ class Recording(Summarised):
         """The only reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
         found = self.sensors
         if len(found) != 1:
-            what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
+            what = "no sensor reading" if not found else f"{len(found)} readings ({first_names([c.name for c in found])})"
             likely = next((one.name for one in found or self.of_role("auxiliary")), "")
             raise MissingChannelError(
                 f"{self.label} has {what}; {self._named_by('--sensor', likely, SENSOR_NAME, 'v')}"

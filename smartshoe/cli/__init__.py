@@ -95,8 +95,8 @@ def group() -> None:
 
 
 SELDOM = 100_000  # objects created between two garbage collections
-_LONGEST_LINE = 280
-_LONGEST_END = 110  # kept from the end of a message, which says how to fix the problem
+_LONGEST_LINE = 400
+_LONGEST_END = 240  # kept from the end of a message, which says how to fix the problem, then lists the names to choose
 
 
 def _one_line(text: str) -> str:

@@ -248,6 +248,21 @@ def test_errors_are_one_sentence_and_leave_no_file(
     assert not result.exists()
 
 
+def test_a_file_of_many_columns_is_refused_with_what_mends_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [f"{side}_{place}" for side in ("left", "right") for place in ("toe", "meta1", "meta4", "heel")]
+    others = [f"{side}_{axis}_of_the_gyroscope_v" for side in ("left", "right") for axis in "xyz"]
+    table = tmp_path / "insoles.csv"
+    rows = np.column_stack([np.arange(200.0), *np.random.default_rng(1).normal(size=(14, 200))])
+    header = ",".join(["time_s", *(f"{name}_n" for name in names), *others])
+    np.savetxt(table, rows, delimiter=",", header=header, comments="", fmt="%.6g")
+    assert run_command(["diagnose", str(table)]) == 5
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert str(table) in last
+    assert "; name its column with --force (columns: " in last
+
+
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["diagnose", "--help"]) == 0
     said = capsys.readouterr().out
