@@ -71,12 +71,13 @@ def command(
     out_folder: str | None,
     calibration_path: str | None,
     design_path: str | None,
-    figures: str | None,
+    figures: tuple[str, ...],
     unit: str | None,
     **columns: Any,
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
-    from smartshoe.cli._output import emit_json, note, progress, require_writable
+    from smartshoe.cli._output import emit_json, note, progress, require_writable, warn
+    from smartshoe.display import first_names
     from smartshoe.errors import NotIdentifiableError, UsageError
     from smartshoe.files.atomic import results_folder
 
@@ -90,7 +91,7 @@ def command(
         return
     if not files:
         raise UsageError("diagnose needs FILES: name one experiment at least, or ask --design SCENARIO.toml")
-    if figures is not None and out_folder is None:
+    if figures and out_folder is None:
         raise UsageError("--figures writes into --out DIR: give --out as well")
     _check(files, held_out)
     with progress() as step, ExitStack() as stack:
@@ -112,14 +113,19 @@ def command(
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
-            from smartshoe.report.diagnosis.folder import publish_diagnosis
+            from smartshoe.report.diagnosis.folder import earlier_files, publish_diagnosis
 
+            earlier = earlier_files(folder)
             written = publish_diagnosis(
                 folder, found, title, _facts(fitted, judges, is_refused=found.verdict == "refused"), figures
             )
+            if gone := [path.name for path in earlier if not path.exists()]:
+                note(f"{folder}: {first_names(gone)} of an earlier diagnosis taken away")
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, fitted, unit)
+    elif calibration_path is not None and Path(calibration_path).is_file():
+        warn(f"{calibration_path} is left as it was: this diagnosis gives no calibration")
     taken = emit_json(found.to_dict(), json_path)
     if refused:
         for said in found.limits[1 : 1 + MOST_NOTES]:

@@ -206,10 +206,26 @@ def test_hopeless_data_is_refused_in_one_sentence_and_the_json_says_so_too(
     assert found["verdict"] == "refused"
     assert holds(found, CONTRACT)
     assert last == f"error: {found['limits'][0]}"
+    assert "earlier" not in heard.err
     page = (out / "diagnosis.html").read_text(encoding="utf-8")
     assert "No diagnosis" in page
     assert f'<p class="facts">given: {smartshoe.read(table).name} · smartshoe: ' in page
     assert not calibration.exists()
+
+
+def test_what_a_refused_diagnosis_takes_away_and_leaves_in_a_used_folder_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, calibration = tmp_path / "out", tmp_path / "c.json"
+    (out / "figures").mkdir(parents=True)
+    (out / "figures" / "diagnosis_loops.svg").write_text("<svg/>")
+    calibration.write_text("{}")
+    words = ["diagnose", str(_dead(tmp_path / "dead.csv")), "--out", str(out), "--calibration", str(calibration)]
+    assert run_command(words) == 5
+    heard = capsys.readouterr().err
+    assert f"note: {out}: diagnosis_loops.svg of an earlier diagnosis taken away\n" in heard
+    assert f"warning: {calibration} is left as it was: this diagnosis gives no calibration\n" in heard
+    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.html", "diagnosis.json"]
 
 
 def test_a_page_without_a_diagnosis_says_what_was_given_and_none_of_it_fitted(tmp_path: Path) -> None:

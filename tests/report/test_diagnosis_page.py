@@ -144,10 +144,10 @@ def test_a_likelier_effect_is_not_told_as_ruled_out_and_an_equation_that_is_not_
 def test_figures_for_papers_are_written_when_asked_for(tmp_path: Path) -> None:
     from smartshoe.report.paper.diagnosis import write_figures
 
-    written = {path.name for path in write_figures(tmp_path, case("two causes"), "svg")}
+    written = {path.name for path in write_figures(tmp_path, case("two causes"), ["svg"])}
     assert {"diagnosis_worst_cycle.svg", "diagnosis_screening.svg", "diagnosis_error_by_state.svg"} <= written
     assert all((tmp_path / name).read_text(encoding="utf-8").endswith("</svg>\n") for name in written)
-    assert write_figures(tmp_path, case("refused"), "svg") == []
+    assert write_figures(tmp_path, case("refused"), ["svg"]) == []
 
 
 @pytest.fixture(scope="module")
