@@ -338,7 +338,8 @@ class Recording(Summarised):
         """The only reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
         found = self.sensors
         if len(found) != 1:
-            what = "no sensor reading" if not found else f"{len(found)} readings ({first_names([c.name for c in found])})"
+            names = first_names([one.name for one in found])
+            what = f"{len(found)} readings ({names})" if found else "no sensor reading"
             likely = next((one.name for one in found or self.of_role("auxiliary")), "")
             raise MissingChannelError(
                 f"{self.label} has {what}; {self._named_by('--sensor', likely, SENSOR_NAME, 'v')}"

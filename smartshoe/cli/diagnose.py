@@ -96,6 +96,7 @@ def command(
     _check(files, held_out)
     with progress() as step, ExitStack() as stack:
         step("reading")
+        from smartshoe.cli._cautions import warn_of_unused_hold_outs
         from smartshoe.diagnosis import diagnose
 
         recordings = read_all(files, unit=unit, **columns)
@@ -109,6 +110,7 @@ def command(
             progress=with_what_is_left(step, folder is not None),
         )
         fitted, judges = _used(found, recordings, others)
+        warn_of_unused_hold_outs(others, judges, found.left_out)
         title = _title(fitted, unit)
         written: dict[str, Path] = {}
         if folder is not None:

@@ -147,6 +147,22 @@ def test_what_was_left_out_is_listed_neither_in_the_page_nor_in_the_calibration(
     assert f"fitted: {first} · judged on: {second} ·" in (out / "diagnosis.html").read_text(encoding="utf-8")
 
 
+def test_a_file_held_out_that_cannot_judge_is_warned_of(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short, copy, dead = tmp_path / "short.csv", tmp_path / "copy.csv", _dead(tmp_path / "dead.csv")
+    short.write_text("time_s,force_n,pressure_mbar\n0,0,0\n0.02,1,1\n0.04,2,2\n")
+    copy.write_bytes(files[0].read_bytes())
+    unused = {short: "the recording holds 3 samples", copy: "holds the same samples as", dead: "the reading is constant"}
+    for judge, instead in ((files[1], "the other files held out"), (None, "load cycles of the fitted files")):
+        words = ["diagnose", str(files[0]), *(f"--hold-out={one}" for one in (*unused, *([judge] if judge else ())))]
+        assert run_command(words) == 0
+        warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+        assert len(warned) == len(unused)
+        for line, (file, why) in zip(warned, unused.items(), strict=True):
+            assert line.startswith(f"warning: --hold-out {file} judges nothing, {instead} do: {why}")
+
+
 def test_recordings_of_no_unit_are_headed_by_one_of_those_that_were_used_and_how_many_more(
     files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from smartshoe.protocol import Protocol
 
-
 _OURS = "# proposed by a diagnosis; its next run in this folder replaces this file or takes it away"
 
 
