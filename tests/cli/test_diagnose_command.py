@@ -153,7 +153,11 @@ def test_a_file_held_out_that_cannot_judge_is_warned_of(
     short, copy, dead = tmp_path / "short.csv", tmp_path / "copy.csv", _dead(tmp_path / "dead.csv")
     short.write_text("time_s,force_n,pressure_mbar\n0,0,0\n0.02,1,1\n0.04,2,2\n")
     copy.write_bytes(files[0].read_bytes())
-    unused = {short: "the recording holds 3 samples", copy: "holds the same samples as", dead: "the reading is constant"}
+    unused = {
+        short: "the recording holds 3 samples",
+        copy: "holds the same samples as",
+        dead: "the reading is constant",
+    }
     for judge, instead in ((files[1], "the other files held out"), (None, "load cycles of the fitted files")):
         words = ["diagnose", str(files[0]), *(f"--hold-out={one}" for one in (*unused, *([judge] if judge else ())))]
         assert run_command(words) == 0

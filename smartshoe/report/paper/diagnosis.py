@@ -38,7 +38,5 @@ def figures_of(diagnosis: Diagnosis) -> Iterator[tuple[str, Figure]]:
 def write_figures(folder: Path, diagnosis: Diagnosis, endings: Sequence[str]) -> list[Path]:
     """Write the figures as ``diagnosis_WHAT`` with each of ``endings`` below ``folder``; returns the paths."""
     return [
-        path
-        for name, figure in figures_of(diagnosis)
-        for path in save(figure, folder, f"diagnosis_{name}", endings)
+        path for name, figure in figures_of(diagnosis) for path in save(figure, folder, f"diagnosis_{name}", endings)
     ]
