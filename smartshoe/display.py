@@ -30,6 +30,11 @@ def first_names(names: Sequence[str]) -> str:
     return ", ".join(shown) + more
 
 
+def counted(count: int, what: str) -> str:
+    """``count`` and ``what``, with the s of a plural unless it is one."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 @dataclass(frozen=True, slots=True)
 class SummaryTable:
     """A ``title``, rows of cells under ``columns``, and remarks below them, one sentence each."""
