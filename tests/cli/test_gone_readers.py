@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from smartshoe.cli import run_command
-
 
 def _unread(words: list[str], *, both: bool = False) -> tuple[int, str]:
     """Exit status and standard error of a command whose standard output, or ``both``, nobody reads from the start."""
@@ -39,10 +37,8 @@ def test_a_command_that_nobody_reads_writes_its_files_and_ends_well(table: Path,
     assert result.is_file()
 
 
-def test_a_table_streamed_to_nobody_is_no_error(table: Path, tmp_path: Path) -> None:
-    calibration = tmp_path / "c.json"
-    assert run_command(["identify", str(table), "--calibration", str(calibration)]) == 0
-    assert _unread(["compensate", str(table), "--calibration", str(calibration), "--out", "/dev/stdout"]) == (0, "")
+def test_a_result_file_that_is_standard_output_may_go_unread(table: Path) -> None:
+    assert _unread(["identify", str(table), "--json", "/dev/stdout"]) == (0, "")
 
 
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["diagnose", "--help"]])
