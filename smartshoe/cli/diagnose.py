@@ -51,7 +51,8 @@ _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing a
     "--design",
     "design_path",
     metavar="SCENARIO.toml",
-    help="Before measuring: which effects the scenario's protocols show and tell apart (no FILE).",
+    help="Before measuring: which effects the scenario's protocols show and tell apart (no FILE, and of the"
+    " other options only --json).",
 )
 @click.option("--json", "json_path", metavar="PATH", help="Write the diagnosis as JSON (- for stdout).")
 @click.option("--out", "out_folder", metavar="DIR", help="Write diagnosis.html, diagnosis.json and the next protocol.")

@@ -304,6 +304,7 @@ def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert "Example: smartshoe diagnose" in said
     assert "--hold-out" in said
+    assert "(no FILE, and of the other options only --json)" in " ".join(said.split())
 
 
 def test_of_many_refused_recordings_a_few_are_told_and_how_many_more(
