@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from smartshoe.cli._output import Talk, printable, talk
-from smartshoe.cli._readers import drop_what_nobody_reads
+from smartshoe.cli._readers import dropping_what_nobody_reads
 from smartshoe.errors import SmartShoeError
 from smartshoe.files.gate.limits import raise_limits
 
@@ -196,5 +196,6 @@ def main() -> None:
     atexit.register(gc.freeze)
     # Workers are started by `python -m`, which would import a numpy.py in the current folder.
     os.environ["PYTHONSAFEPATH"] = "1"
-    drop_what_nobody_reads()
-    sys.exit(run_command(sys.argv[1:]))
+    with dropping_what_nobody_reads():
+        status = run_command(sys.argv[1:])
+    sys.exit(status)

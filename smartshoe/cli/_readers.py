@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -36,9 +38,18 @@ class _Dropping(io.TextIOWrapper):
         self.is_read = False
 
 
-def drop_what_nobody_reads() -> None:
+@contextmanager
+def dropping_what_nobody_reads() -> Iterator[None]:
     """Let the readers of this process's standard output and error go without an error of the command."""
-    sys.stdout, sys.stderr = _dropping(sys.stdout), _dropping(sys.stderr)
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = made = _dropping(sys.stdout), _dropping(sys.stderr)
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
+        for one in made:
+            if isinstance(one, _Dropping):
+                one.detach()  # else its end would close the file of the stream before
 
 
 def _dropping(stream: Any) -> Any:

@@ -54,6 +54,14 @@ def test_a_refusal_keeps_its_status_and_its_sentence_though_nobody_reads_the_res
     assert said.startswith("error: ")
 
 
+def test_a_program_that_runs_a_command_keeps_its_own_output() -> None:
+    script = (
+        "import sys; from smartshoe import cli; sys.argv[1:] = ['--version']\ntry: cli.main()\nfinally: print('on')"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=True)
+    assert ended.stdout.splitlines()[-1] == "on"
+
+
 def test_a_stream_ends_when_its_reader_has_gone() -> None:
     status, said = _unread(["stream", "--shoe", "sim:walk?duration_s=1e5"])
     assert status == 0
