@@ -67,7 +67,9 @@ class AtCorners:
     rate_sd: float
 
 
-def follow_corners(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> AtCorners | None:
+def follow_corners(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
+) -> AtCorners | None:
     """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) by the corners of ``load`` (m,) at ``machine_s`` (m,).
 
     The search begins on either side of ``delay_s``, half of `SLOPE_OVER_S` away, within which a corner is seen. None
@@ -82,7 +84,9 @@ def follow_corners(machine_s: Array, load: Array, logger_s: Array, signal: Array
     return first if abs(first.delay_s - second.delay_s) <= max(first.delay_sd_s, second.delay_sd_s) else None
 
 
-def _searched_from(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> AtCorners | None:
+def _searched_from(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
+) -> AtCorners | None:
     """Where a search from ``delay_s`` ends; None where fewer than two corners can be used."""
     at_corners = corners(machine_s, load)
     gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))

@@ -133,7 +133,9 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
     return Following(delay, float(sd[-3]), rate, float(sd[-2]), 1.0 / pole, residual, misfit)
 
 
-def follow(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float, powers: int = 1) -> Following:
+def follow(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float, powers: int = 1
+) -> Following:
     """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) behind ``load`` (m,) at ``machine_s`` (m,).
 
     The search begins at ``delay_s``; of the fits from the time constants `STARTS_S` the better one is returned.
