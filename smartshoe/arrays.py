@@ -18,10 +18,13 @@ Integers = NDArray[np.int64]
 def numbers_of(values: ArrayLike, what: str) -> Array:
     """``values`` as an array of real numbers, without a copy if possible.
 
-    Raises `InputError` naming ``what`` otherwise. None counts as NaN, as in tables read by other libraries.
+    Raises `InputError` naming ``what`` otherwise. None counts as NaN, as in tables read by other libraries, and so does
+    what a masked array hides.
     """
     try:
         given: Any = values if hasattr(getattr(values, "dtype", None), "kind") else np.asarray(values)
+        if isinstance(given, np.ma.MaskedArray) and given.dtype.kind in "biufO":
+            given = np.where(np.ma.getmaskarray(given), np.nan, given.data)  # numpy would use what the mask hides
         kinds = {given.dtype.kind}
         if "O" in kinds:
             of_each_type = {type(one): one for one in np.ravel(given) if one is not None}

@@ -13,14 +13,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_NAMES = 10  # column names in a sentence
+MOST_NAMES, MOST_LETTERS = 10, 90  # column names in a sentence, and their letters, so that it keeps its end
+LONGEST_NAME = 60  # letters of a name in a sentence; of a longer one, half of them from each end
 SUREST = 0.99  # largest probability given in percent
 
 
 def first_names(names: Sequence[str]) -> str:
-    """The names as text, at most `MOST_NAMES` of them, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    """The first of the names as text, at most `MOST_NAMES` and about `MOST_LETTERS`, and how many more there are."""
+    shown: list[str] = []
+    for name in names[:MOST_NAMES]:
+        short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME // 2]}...{name[-LONGEST_NAME // 2 :]}"
+        if shown and len(", ".join([*shown, short])) > MOST_LETTERS:
+            break
+        shown.append(short)
+    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    return ", ".join(shown) + more
+
+
+def counted(count: int, what: str) -> str:
+    """``count`` and ``what``, with the s of a plural unless it is one."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +127,14 @@ def moment(time_s: float, digits: int = 6) -> str:
         return f"{time_s:.{digits}g}"
     fixed = f"{time_s:.{digits - 3}f}"
     return fixed.rstrip("0").rstrip(".") if "." in fixed else fixed
+
+
+def duration(time_s: float) -> str:
+    """A duration to three digits, in s below two minutes, in min below two hours, else in h."""
+    for limit_s, unit_s, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min")):
+        if time_s < limit_s:
+            return f"{time_s / unit_s:.3g} {name}"
+    return f"{time_s / 3600.0:.3g} h"
 
 
 def panels(count: int, *, height: float = 2.6) -> tuple[Figure, list[Axes]]:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -157,7 +157,7 @@ class Recording(Summarised):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        time_s = np.array(self.time_s, dtype=float, copy=True)
+        time_s = np.array(numbers_of(self.time_s, f"{self.label}: time_s"), copy=True)
         if time_s.ndim != 1 or time_s.size == 0:
             raise InputError(f"{self.label} holds no samples")
         if not np.isfinite(time_s).all():
@@ -201,9 +201,9 @@ class Recording(Summarised):
     ) -> Self:
         """A recording from arrays named like a plain table's columns: ``force_n=``, ``pressure_mbar=``, ...
 
-        A single column beside the load is the reading if its unit is one of sensor readings (``cell_v=``). NaN marks a
-        missing sample. Raises `UnitError` for a name without a unit, `InputError` for values that are not numbers,
-        shapes that differ or time that does not increase.
+        A single column beside the load is the reading if its unit is one of sensor readings (``cell_v=``). NaN, or a
+        masked array's mask, marks a missing sample. Raises `UnitError` for a name without a unit, `InputError` for
+        values that are not numbers, shapes that differ or time that does not increase.
         """
         channels: dict[str, Channel] = {}
         for column, values in columns.items():
@@ -220,7 +220,7 @@ class Recording(Summarised):
         only = only_reading([one.role for one in channels.values()], [one.unit for one in channels.values()])
         if only is not None:
             channels[keys[only]] = replace(channels[keys[only]], role="sensor")
-        return cls(numbers_of(time_s, f"{name}: time_s"), channels, name, unit, dict(metadata or {}))
+        return cls(cast("Array", time_s), channels, name, unit, dict(metadata or {}))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Support pickling between processes, which a mapping proxy does not."""
@@ -252,7 +252,7 @@ class Recording(Summarised):
             return self.channels[name]
         except KeyError:
             raise MissingChannelError(
-                f"{self.label} has no channel {name!r}; it has {', '.join(self.channels) or 'none'}"
+                f"{self.label} has no channel {name!r}; it has {first_names(list(self.channels)) or 'none'}"
             ) from None
 
     @property
@@ -338,7 +338,8 @@ class Recording(Summarised):
         """The only reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
         found = self.sensors
         if len(found) != 1:
-            what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
+            names = first_names([one.name for one in found])
+            what = f"{len(found)} readings ({names})" if found else "no sensor reading"
             likely = next((one.name for one in found or self.of_role("auxiliary")), "")
             raise MissingChannelError(
                 f"{self.label} has {what}; {self._named_by('--sensor', likely, SENSOR_NAME, 'v')}"

@@ -15,6 +15,7 @@ from typing import Any
 import click
 
 from smartshoe.cli._output import Talk, printable, talk
+from smartshoe.cli._readers import dropping_what_nobody_reads
 from smartshoe.errors import SmartShoeError
 from smartshoe.files.gate.limits import raise_limits
 
@@ -95,8 +96,8 @@ def group() -> None:
 
 
 SELDOM = 100_000  # objects created between two garbage collections
-_LONGEST_LINE = 280
-_LONGEST_END = 110  # kept from the end of a message, which says how to fix the problem
+_LONGEST_LINE = 400
+_LONGEST_END = 240  # kept from the end of a message, which says how to fix the problem, then lists the names to choose
 
 
 def _one_line(text: str) -> str:
@@ -145,10 +146,6 @@ def run_command(arguments: Sequence[str]) -> int:
         raise_limits(common.limits)
         result: Any = group.main(args=words, prog_name="smartshoe", standalone_mode=False)
         return result if isinstance(result, int) else 0
-    except BrokenPipeError:
-        # The reader of our output (head, less) closed it, which is no error of the command.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except Exception as error:
         if common.debug:
             raise
@@ -199,4 +196,6 @@ def main() -> None:
     atexit.register(gc.freeze)
     # Workers are started by `python -m`, which would import a numpy.py in the current folder.
     os.environ["PYTHONSAFEPATH"] = "1"
-    sys.exit(run_command(sys.argv[1:]))
+    with dropping_what_nobody_reads():
+        status = run_command(sys.argv[1:])
+    sys.exit(status)

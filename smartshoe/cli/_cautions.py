@@ -67,6 +67,20 @@ def warn_of_forces_beyond(label: str, time_s: Array, force_n: Array, calibration
         )
 
 
+def warn_of_unused_hold_outs(others: Sequence[Recording], judges: Sequence[Recording], left_out: Sequence[str]) -> None:
+    """Warn on stderr for each of ``others`` that was to be held out and is none of ``judges``.
+
+    ``left_out`` are the reasons, each of which begins with its recording's label.
+    """
+    for one in others:
+        if any(judge is one for judge in judges):
+            continue
+        begins = (f"{one.label}: ", f"{one.label} ")
+        why = next((why.removeprefix(one.label).lstrip(": ") for why in left_out if why.startswith(begins)), "no use")
+        instead = "the other files held out" if judges else "load cycles of the fitted files"
+        warn(f"--hold-out {one.label} judges nothing, {instead} do: {why}")
+
+
 def warn_of_use_from_rest(recordings: Sequence[Recording], calibration: Calibration, told_n: float) -> None:
     """Warn on stderr where a calibration is far off on the very recordings that it was fitted to.
 

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 
 figures_option = click.option(
-    "--figures", type=click.Choice(["svg", "pdf", "png"]), help="Write figures for papers as well, below DIR/figures."
+    "--figures",
+    type=click.Choice(["svg", "pdf", "png"]),
+    multiple=True,
+    help="Write figures for papers as well, below DIR/figures (repeatable).",
 )
 
 

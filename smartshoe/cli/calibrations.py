@@ -180,7 +180,7 @@ def compare_command(
 @_store_option
 @_json_option
 def drift_command(
-    unit: str, out_folder: str | None, store_folder: str | None, json_path: str | None, figures: str | None
+    unit: str, out_folder: str | None, store_folder: str | None, json_path: str | None, figures: tuple[str, ...]
 ) -> None:
     """How a unit's parameters move over its life: trend, repairs, jumps."""
     from smartshoe.calibration.store.drift import drift
@@ -192,7 +192,7 @@ def drift_command(
     _show_faults(store)
     from smartshoe.report.drift import print_drift, write_drift
 
-    if figures is not None and out_folder is None:
+    if figures and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
     written = write_drift(out_folder, found, figures) if out_folder is not None else {}
     if emit_json(found.to_dict(), json_path):

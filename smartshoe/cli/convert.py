@@ -27,7 +27,7 @@ def command(
 ) -> None:
     """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
     from smartshoe.cli._output import progress, require_writable
-    from smartshoe.display import first_names
+    from smartshoe.display import counted, first_names
     from smartshoe.files.logs import write
 
     require_writable(target, read=[source])
@@ -39,7 +39,7 @@ def command(
         step("writing")
         write(recording, target)
     names = first_names([f"{c.name} [{c.unit.symbol}]" for c in recording.channels.values()])
-    click.echo(f"{target}: {len(recording)} samples over {recording.duration_s:g} s of {names}")
+    click.echo(f"{target}: {counted(len(recording), 'sample')} over {recording.duration_s:g} s of {names}")
 
 
 def in_contract_units(recording: Recording) -> Recording:

@@ -51,7 +51,8 @@ _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing a
     "--design",
     "design_path",
     metavar="SCENARIO.toml",
-    help="Before measuring: which effects the scenario's protocols show and tell apart (no FILE).",
+    help="Before measuring: which effects the scenario's protocols show and tell apart (no FILE, and of the"
+    " other options only --json).",
 )
 @click.option("--json", "json_path", metavar="PATH", help="Write the diagnosis as JSON (- for stdout).")
 @click.option("--out", "out_folder", metavar="DIR", help="Write diagnosis.html, diagnosis.json and the next protocol.")
@@ -71,12 +72,13 @@ def command(
     out_folder: str | None,
     calibration_path: str | None,
     design_path: str | None,
-    figures: str | None,
+    figures: tuple[str, ...],
     unit: str | None,
     **columns: Any,
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
-    from smartshoe.cli._output import emit_json, note, progress, require_writable
+    from smartshoe.cli._output import emit_json, note, progress, require_writable, warn
+    from smartshoe.display import first_names
     from smartshoe.errors import NotIdentifiableError, UsageError
     from smartshoe.files.atomic import results_folder
 
@@ -90,11 +92,12 @@ def command(
         return
     if not files:
         raise UsageError("diagnose needs FILES: name one experiment at least, or ask --design SCENARIO.toml")
-    if figures is not None and out_folder is None:
+    if figures and out_folder is None:
         raise UsageError("--figures writes into --out DIR: give --out as well")
     _check(files, held_out)
     with progress() as step, ExitStack() as stack:
         step("reading")
+        from smartshoe.cli._cautions import warn_of_unused_hold_outs
         from smartshoe.diagnosis import diagnose
 
         recordings = read_all(files, unit=unit, **columns)
@@ -108,18 +111,24 @@ def command(
             progress=with_what_is_left(step, folder is not None),
         )
         fitted, judges = _used(found, recordings, others)
+        warn_of_unused_hold_outs(others, judges, found.left_out)
         title = _title(fitted, unit)
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
-            from smartshoe.report.diagnosis.folder import publish_diagnosis
+            from smartshoe.report.diagnosis.folder import earlier_files, publish_diagnosis
 
+            earlier = earlier_files(folder)
             written = publish_diagnosis(
                 folder, found, title, _facts(fitted, judges, is_refused=found.verdict == "refused"), figures
             )
+            if gone := [path.name for path in earlier if not path.exists()]:
+                note(f"{folder}: {first_names(gone)} of an earlier diagnosis taken away")
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, fitted, unit)
+    elif calibration_path is not None and Path(calibration_path).is_file():
+        warn(f"{calibration_path} is left as it was: this diagnosis gives no calibration")
     taken = emit_json(found.to_dict(), json_path)
     if refused:
         for said in found.limits[1 : 1 + MOST_NOTES]:

@@ -85,7 +85,7 @@ def command(
     c3d_path: str | None,
     out_folder: str | None,
     stream: bool | None,
-    figures: str | None,
+    figures: tuple[str, ...],
     sensors: tuple[str, ...],
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
@@ -99,7 +99,7 @@ def command(
         from smartshoe.files.logs import read
         from smartshoe.gait import Coverage, analyse
 
-    if figures is not None and out_folder is None:
+    if figures and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
     require_writable(c3d_path, json_path=json_path, folder=out_folder, read=(*files, *calibration_paths))
     if body_weight_n is not None and 0.0 < body_weight_n < LEAST_WEIGHT_N:
@@ -113,7 +113,7 @@ def command(
             {
                 "--reference": reference,
                 "--c3d": c3d_path,
-                "--figures": figures,
+                "--figures": figures[0] if figures else None,
                 "--sensor": sensors[0] if sensors else None,
             }
         )

@@ -28,12 +28,12 @@ def command(
     assignments: tuple[str, ...],
     out_folder: str | None,
     json_path: str | None,
-    figures: str | None,
+    figures: tuple[str, ...],
 ) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
     from smartshoe.cli._output import emit_json, progress, require_writable
 
-    if figures is not None and out_folder is None:
+    if figures and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
     require_writable(json_path=json_path, folder=out_folder, read=[scenario])
     with progress() as step, ExitStack() as stack:

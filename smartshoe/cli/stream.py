@@ -14,6 +14,7 @@ import click
 
 from smartshoe.cli._output import note, require_writable
 from smartshoe.cli._ranges import FiniteRange
+from smartshoe.cli._readers import is_output_read
 
 if TYPE_CHECKING:
     from smartshoe.devices import Shoe
@@ -109,6 +110,8 @@ class _StreamRun:
             last_s = float(block.time_s[-1])
             if last_s >= due_s:
                 click.echo(seconds.report(last_s))
+                if not is_output_read():
+                    break
                 if self._lost(shoe) > lost:
                     lost = self._lost(shoe)
                     note(f"samples lost so far: {lost}")

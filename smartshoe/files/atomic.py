@@ -55,7 +55,8 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
             temporary.chmod(0o666 & ~umask)
         yield temporary
         if streamed:
-            _write_through(temporary, target)
+            with suppress(BrokenPipeError):  # the reader has gone (head, less), which is no error of ours
+                _write_through(temporary, target)
         else:
             if durable:
                 _to_disk(temporary)
@@ -64,8 +65,6 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
                 sync_folder(named.parent)
     except SmartShoeError:
         raise
-    except BrokenPipeError:
-        raise  # the reader of our output closed it, which is no error of ours
     except OSError as error:
         raise _unwritable(path, error) from error
     finally:

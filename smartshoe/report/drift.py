@@ -105,8 +105,8 @@ def _jumps(drift: Drift) -> str:
     return jump.says
 
 
-def write_drift(folder: Path | str, drift: Drift, figures: str | None = None) -> dict[str, Path]:
-    """Write drift.html and drift.json, and with ``figures`` drift.svg (or pdf, png); returns the paths."""
+def write_drift(folder: Path | str, drift: Drift, figures: Sequence[str] = ()) -> dict[str, Path]:
+    """Write drift.html and drift.json, and with ``figures`` (endings) drift.svg, pdf, png; returns the paths."""
     target = make_folder(folder)
     grade, says = headline(drift)
     written = {"report": target / "drift.html", "result": target / "drift.json"}
@@ -119,11 +119,12 @@ def write_drift(folder: Path | str, drift: Drift, figures: str | None = None) ->
     }
     write_document(written["report"], "drift.html", facts)
     write_text(written["result"], json_text(drift.to_dict()))
-    if figures is not None:
+    if figures:
         from smartshoe.report.paper.drawing import save
         from smartshoe.report.paper.drift import draw_drift
 
-        written["figure"] = save(draw_drift(drift), target / f"drift.{figures}")
+        for path in save(draw_drift(drift), target, "drift", figures):
+            written["figure" if len(figures) == 1 else f"figure as {path.suffix[1:]}"] = path
     return written
 
 

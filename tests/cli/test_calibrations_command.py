@@ -51,8 +51,8 @@ def test_a_units_life_from_add_to_drift(folder: Path, capsys: pytest.CaptureFixt
     assert Calibration.load("c.json").serial_number == "S1"
     compared = json.loads(run(capsys, "compare", "toe0.json", unit["calibrations"][2]["name"], "--json", "-"))
     assert compared["forces"][0]["largest_n"] == pytest.approx(-16.0)
-    assert "static gain" in run(capsys, "drift", "S1", "--out", "drift", "--figures", "svg")
-    assert sorted(path.name for path in Path("drift").iterdir()) == ["drift.html", "drift.json", "drift.svg"]
+    assert "static gain" in run(capsys, "drift", "S1", "--out", "drift", "--figures", "svg", "--figures", "png")
+    assert sorted(path.suffix for path in Path("drift").glob("drift.*")) == [".html", ".json", ".png", ".svg"]
     run(capsys, "retire", "S1", "--date", "2026-03-05")
     assert "retired" in run(capsys, "show", "S1", "--date", "2026-03-06", status=5)
 

@@ -147,6 +147,26 @@ def test_what_was_left_out_is_listed_neither_in_the_page_nor_in_the_calibration(
     assert f"fitted: {first} · judged on: {second} ·" in (out / "diagnosis.html").read_text(encoding="utf-8")
 
 
+def test_a_file_held_out_that_cannot_judge_is_warned_of(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short, copy, dead = tmp_path / "short.csv", tmp_path / "copy.csv", _dead(tmp_path / "dead.csv")
+    short.write_text("time_s,force_n,pressure_mbar\n0,0,0\n0.02,1,1\n0.04,2,2\n")
+    copy.write_bytes(files[0].read_bytes())
+    unused = {
+        short: "the recording holds 3 samples",
+        copy: "holds the same samples as",
+        dead: "the reading is constant",
+    }
+    for judge, instead in ((files[1], "the other files held out"), (None, "load cycles of the fitted files")):
+        words = ["diagnose", str(files[0]), *(f"--hold-out={one}" for one in (*unused, *([judge] if judge else ())))]
+        assert run_command(words) == 0
+        warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+        assert len(warned) == len(unused)
+        for line, (file, why) in zip(warned, unused.items(), strict=True):
+            assert line.startswith(f"warning: --hold-out {file} judges nothing, {instead} do: {why}")
+
+
 def test_recordings_of_no_unit_are_headed_by_one_of_those_that_were_used_and_how_many_more(
     files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -206,10 +226,26 @@ def test_hopeless_data_is_refused_in_one_sentence_and_the_json_says_so_too(
     assert found["verdict"] == "refused"
     assert holds(found, CONTRACT)
     assert last == f"error: {found['limits'][0]}"
+    assert "earlier" not in heard.err
     page = (out / "diagnosis.html").read_text(encoding="utf-8")
     assert "No diagnosis" in page
     assert f'<p class="facts">given: {smartshoe.read(table).name} · smartshoe: ' in page
     assert not calibration.exists()
+
+
+def test_what_a_refused_diagnosis_takes_away_and_leaves_in_a_used_folder_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, calibration = tmp_path / "out", tmp_path / "c.json"
+    (out / "figures").mkdir(parents=True)
+    (out / "figures" / "diagnosis_loops.svg").write_text("<svg/>")
+    calibration.write_text("{}")
+    words = ["diagnose", str(_dead(tmp_path / "dead.csv")), "--out", str(out), "--calibration", str(calibration)]
+    assert run_command(words) == 5
+    heard = capsys.readouterr().err
+    assert f"note: {out}: diagnosis_loops.svg of an earlier diagnosis taken away\n" in heard
+    assert f"warning: {calibration} is left as it was: this diagnosis gives no calibration\n" in heard
+    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.html", "diagnosis.json"]
 
 
 def test_a_page_without_a_diagnosis_says_what_was_given_and_none_of_it_fitted(tmp_path: Path) -> None:
@@ -248,11 +284,27 @@ def test_errors_are_one_sentence_and_leave_no_file(
     assert not result.exists()
 
 
+def test_a_file_of_many_columns_is_refused_with_what_mends_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [f"{side}_{place}" for side in ("left", "right") for place in ("toe", "meta1", "meta4", "heel")]
+    others = [f"{side}_{axis}_of_the_gyroscope_v" for side in ("left", "right") for axis in "xyz"]
+    table = tmp_path / "insoles.csv"
+    rows = np.column_stack([np.arange(200.0), *np.random.default_rng(1).normal(size=(14, 200))])
+    header = ",".join(["time_s", *(f"{name}_n" for name in names), *others])
+    np.savetxt(table, rows, delimiter=",", header=header, comments="", fmt="%.6g")
+    assert run_command(["diagnose", str(table)]) == 5
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert str(table) in last
+    assert "; name its column with --force (columns: " in last
+
+
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["diagnose", "--help"]) == 0
     said = capsys.readouterr().out
     assert "Example: smartshoe diagnose" in said
     assert "--hold-out" in said
+    assert "(no FILE, and of the other options only --json)" in " ".join(said.split())
 
 
 def test_of_many_refused_recordings_a_few_are_told_and_how_many_more(

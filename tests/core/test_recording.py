@@ -127,6 +127,28 @@ def test_missing_samples_repeat_the_last_one_and_come_back_as_nan(values: list[f
             assert held == last
 
 
+@given(
+    st.lists(st.tuples(st.integers(-1000, 1000), st.booleans()), min_size=1, max_size=30),
+    st.sampled_from([float, np.float32, int, object]),
+)
+def test_what_a_masked_array_hides_is_missing(samples: list[tuple[int, bool]], dtype: type) -> None:
+    values, hidden = (list(column) for column in zip(*samples, strict=True))
+    masked = np.ma.MaskedArray(np.array(values, dtype=dtype), mask=hidden)
+    time_s = np.arange(len(values), dtype=float)
+    made = Recording.from_arrays(time_s=time_s, force_n=masked, pressure_mbar=masked)
+    for channel in made.channels.values():
+        np.testing.assert_array_equal(channel.present, ~np.array(hidden))
+        np.testing.assert_array_equal(channel.with_nan(), np.where(hidden, np.nan, values))
+
+
+def test_a_time_that_a_mask_hides_is_missing() -> None:
+    time_s = np.ma.MaskedArray([0.0, 1.0, 2.0], mask=[False, True, False])
+    with pytest.raises(InputError, match="time of sample 2 is missing"):
+        Recording.from_arrays(time_s=time_s, force_n=np.ones(3))
+    with pytest.raises(InputError, match="time of sample 2 is missing"):
+        Recording(time_s, {})
+
+
 @pytest.mark.parametrize(
     ("column", "name", "symbol"),
     [("force_n", "force", "N"), ("left_meta1_mbar", "left_meta1", "mbar"), ("rate_n_per_s", "rate", "N/s")],

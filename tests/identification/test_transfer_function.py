@@ -354,6 +354,9 @@ def test_missing_samples_are_counted_and_their_values_do_not_matter(hold):
     assert estimate.n_samples == y.size - estimate.n_missing
     assert np.array_equal(np.isnan(estimate.residual[0]), ~np.isfinite(y))
     np.testing.assert_allclose(found_coefficients(estimate), coefficients(LATE), rtol=1e-8)
+    hidden = np.ma.MaskedArray(np.where(np.isfinite(y), y, 1e9), mask=~np.isfinite(y))
+    masked = identify_transfer_function(u, hidden, sample_time_s=0.1, poles=2, zeros=1, intersample=hold)
+    np.testing.assert_array_equal(found_coefficients(masked), found_coefficients(estimate))
 
 
 @pytest.mark.parametrize("hold", ["zoh", "foh"])

@@ -80,6 +80,15 @@ def test_whole_numbers_have_no_digits_behind_the_point_and_minus_is_minus(tabula
     assert "-" not in "".join(_column(rows, 1))
 
 
+def test_of_many_points_the_table_says_how_many_of_them_it_lists(tabulated: Drawn, browser: Browser) -> None:
+    for count, listed in ((66, "33 of the 66"), (12, "All 12")):
+        x = np.arange(float(count))
+        rows = tabulated(_chart(x, [Panel("y (V)", [Line("y", x, "load")])]))
+        said = browser.run("document.querySelector('details.numbers .note').textContent")
+        assert said == f"{listed} points that are shown."
+        assert len(rows) - 1 == int(listed.removeprefix("All ").split()[0])
+
+
 def test_headings_have_the_unit_once(tabulated: Drawn) -> None:
     x = np.arange(4.0)
     two = [Panel("load (N)", [Line("load", x, "load")]), Panel("before (V)", [Line("before", x, "raw")])]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from smartshoe.models.effects import blocks
 from smartshoe.protocol import Protocol
-from smartshoe.report.diagnosis._charts import faults
+from smartshoe.report.diagnosis._charts import faults, over_cycles, protocol
 from smartshoe.report.diagnosis._protocol_file import protocol_text
 from smartshoe.report.diagnosis.grids import ranked
 from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_at_two_rates, spectrum, worst_cycle
@@ -49,6 +49,23 @@ def test_a_protocol_becomes_a_table_that_toml_reads_back() -> None:
     assert table["kind"] == "segments"
     time_s, load_n = LOOPS.corners()
     np.testing.assert_allclose(np.array(table["corners"]), np.column_stack([time_s, load_n]))
+
+
+def test_a_protocol_of_seconds_is_told_in_seconds() -> None:
+    assert protocol(LOOPS).says == "8 s, up to 400 N."
+
+
+def test_cycles_that_count_on_from_fitted_recordings_are_told_to() -> None:
+    found = evidence(case("two causes").traces, FULL_LOAD_N)
+    assert found is not None
+    drawn = over_cycles(found, "mbar")
+    assert drawn is not None
+    assert drawn.x[0] > 1
+    assert drawn.says.endswith("Numbers count on through all recordings; those that were fitted are not shown.")
+    drawn = over_cycles(replace(found, held_out=np.zeros_like(found.held_out)), "mbar")
+    assert drawn is not None
+    assert drawn.x[0] == 1
+    assert drawn.says.endswith("Numbers count on through all recordings.")
 
 
 def test_the_worst_cycle_is_the_one_with_the_largest_error_among_those_held_out() -> None:

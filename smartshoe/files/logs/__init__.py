@@ -17,6 +17,15 @@ from smartshoe.files.logs.formats import formats
 from smartshoe.recording import Recording
 
 _HEAD_BYTES = 1 << 16
+# First bytes of files that hold other files, and what to do with them.
+_PACKED = {
+    b"\x1f\x8b": "packed by gzip: unpack it (gunzip)",
+    b"BZh": "packed by bzip2: unpack it (bunzip2)",
+    b"\xfd7zXZ\0": "packed by xz: unpack it (unxz)",
+    b"\x28\xb5\x2f\xfd": "packed by zstd: unpack it (unzstd)",
+    b"7z\xbc\xaf\x27\x1c": "a 7z archive: unpack it and name a file of it",
+    b"PK\x03\x04": "a zip archive or a workbook: unpack it and name a file of it, or export the sheet as CSV",
+}
 
 
 def _head(path: Path) -> bytes:
@@ -45,9 +54,11 @@ def detect(path: Path | str) -> Format:
         # A text suffix on a binary file is meaningless; other suffixes select a reader that can report the fault.
         if path.suffix.casefold() in format_.suffixes and not format_.is_text:
             return format_
-    raise FormatError(
-        f"{path} is binary and in no known format: give a {', '.join(format_.title for format_ in formats())}"
-    )
+    packed = next((what for begins, what in _PACKED.items() if head.startswith(begins)), None)
+    if packed is not None:
+        raise FormatError(f"{path} is {packed}")
+    *titles, last = (format_.title for format_ in formats())
+    raise FormatError(f"{path} is binary and in no known format: give a {', '.join(titles)} or {last}")
 
 
 def read_sheet(path: Path | str) -> Sheet:

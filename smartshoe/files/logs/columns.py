@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from smartshoe.display import counted
 from smartshoe.errors import InputError
 from smartshoe.files.logs._sheet import Column, Sheet
 from smartshoe.files.logs._times import check_increasing, counts_rows, time_of
@@ -127,7 +128,7 @@ def _turned(load: Channel) -> Channel:
 def _channel(sheet: Sheet, name: str, column: Column, unit_: Unit, role: Role, notes: list[str]) -> Channel | None:
     infinite = int(np.count_nonzero(np.isinf(column.values)))
     if infinite:
-        notes.append(f"Column {column.name} holds {infinite} infinite samples, which count as missing.")
+        notes.append(f"Column {column.name} holds {counted(infinite, 'infinite sample')}, taken as missing.")
     channel = Channel.from_values(name, column.values, unit_, role)
     if channel.missing is not None and channel.missing.all():
         if role != "auxiliary":

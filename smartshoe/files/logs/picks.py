@@ -52,7 +52,24 @@ def names_a_column(sheet: Sheet, choice: str) -> bool:
     """Whether a user's ``choice`` names a column of the sheet, by name or number; units are ignored."""
     bracket = _CHOICE.fullmatch(choice)
     bases = (choice.strip(), bracket["base"].strip()) if bracket else (choice.strip(),)
-    return any(_titled(sheet.columns, base) or _numbered(sheet, base) for base in bases)
+    return any(_titled(sheet.columns, base) or _other_way(sheet, base) for base in bases)
+
+
+def _other_way(sheet: Sheet, base: str) -> list[int]:
+    """Index of the column with that number, or which a recording calls so (see `_renamed`)."""
+    return _numbered(sheet, base) or _renamed(sheet.columns, base)
+
+
+def _renamed(columns: Sequence[Column], wanted: str) -> list[int]:
+    """Index of the column that a recording calls ``wanted`` since another one has its name: NAME_other, NAME_2.
+
+    Messages about recordings list such names for the user to choose from.
+    """
+    name, _, ending = wanted.rpartition("_")
+    found = _titled(columns, name)
+    if ending == "other":
+        return found if len(found) == 1 else []
+    return [found[int(ending) - 1]] if ending in map(str, range(2, len(found) + 1)) else []
 
 
 def _numbered(sheet: Sheet, base: str) -> list[int]:
@@ -77,7 +94,7 @@ def pick(sheet: Sheet, choice: str, option: str) -> Pick:
             f"{sheet.path}: {option} {choice!r} fits {len(found)} columns: add the unit in brackets, or rename one"
             f" of them (columns: {titles(sheet)})"
         )
-    found = found or _numbered(sheet, base)
+    found = found or _other_way(sheet, base)
     if not found:
         raise MissingChannelError(
             f"{sheet.path} has no column {base!r} for {option}: choose one of its columns ({titles(sheet)}) by name"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Array, Mask, numbers_of
 from smartshoe.errors import InputError, NotIdentifiableError, UsageError
 from smartshoe.identification.transfer_function._discrete import Intersample
 from smartshoe.models.first_order import steps
@@ -37,9 +37,9 @@ def as_signals(values: Any, what: str) -> list[Array]:
     """One array or several as a list of one-dimensional arrays; raises `UsageError` on another shape."""
     several = isinstance(values, list | tuple) and bool(values) and np.ndim(values[0]) > 0
     try:
-        signals = [np.array(value, dtype=float) for value in (values if several else [values])]
-    except (TypeError, ValueError) as error:
-        raise UsageError(f"{what} is not an array of numbers ({error})") from error
+        signals = [np.array(numbers_of(value, what)) for value in (values if several else [values])]
+    except InputError as error:
+        raise UsageError(str(error)) from error
     signals = [signal.ravel() if signal.ndim == 2 and 1 in signal.shape else signal for signal in signals]
     for index, signal in enumerate(signals):
         if signal.ndim != 1:

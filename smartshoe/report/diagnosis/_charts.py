@@ -8,6 +8,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis import Diagnosis, Trace
+from smartshoe.display import duration
 from smartshoe.protocol import Protocol
 from smartshoe.report.charts import Chart, Line, Mark, Panel, Style
 from smartshoe.report.diagnosis._sentences import file_name
@@ -71,8 +72,7 @@ def over_time(found: EvidenceView, unit: str) -> Chart:
         ]
     said = "Measured less simulated reading, recordings one after the other."
     said += " Shaded: not fitted." if marks else ""
-    title = "The error before and after" if found.is_changed else "The error over time"
-    return Chart(title, said, "time (s)", found.time_s, panels, marks=marks)
+    return Chart("The error over time", said, "time (s)", found.time_s, panels, marks=marks)
 
 
 def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
@@ -173,9 +173,13 @@ def over_cycles(found: EvidenceView, unit: str) -> Chart | None:
         return None
     edges = np.asarray(np.arange(cycle.min(), cycle.max() + 2) + 0.5, dtype=np.float64)
     x, lines = _means(found, cycle.astype(np.float64) + 1.0, edges)
-    return Chart("The error over load cycles", "Mean and band of one sd; what comes and goes with use"
-                 " shows here. Where load cycles are few, they are parts of the time.",
-                 "load cycle (number)", x, [Panel(f"measured − simulated ({unit})", lines)])  # fmt: skip
+    says = (
+        "Mean and band of one sd; what comes and goes with use shows here. Where load cycles are few, they are parts of"
+        " the time. Numbers count on through all recordings"
+    )
+    says += "." if found.judged.all() else "; those that were fitted are not shown."
+    panels = [Panel(f"measured − simulated ({unit})", lines)]
+    return Chart("The error over load cycles", says, "load cycle (number)", x, panels)
 
 
 def over_frequency(found: EvidenceView, unit: str) -> Chart | None:
@@ -217,5 +221,5 @@ def faults(diagnosis: Diagnosis) -> list[Chart]:
 def protocol(steps: Protocol) -> Chart:
     """The load over time that a protocol prescribes."""
     time_s, load_n = steps.corners()
-    says = f"{plain(steps.duration_s / 60)} min, up to {plain(float(np.max(load_n)))} N."
+    says = f"{duration(steps.duration_s)}, up to {plain(float(np.max(load_n)))} N."
     return Chart("The load to run next", says, "time (s)", time_s, [Panel("load (N)", [Line("load", load_n, "load")])])

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from smartshoe.diagnosis import Diagnosis
 from smartshoe.files.atomic import json_text, make_folder, write_text
 from smartshoe.report.diagnosis._page import write_diagnosis_page
-from smartshoe.report.diagnosis._protocol_file import protocol_text, table_name
+from smartshoe.report.diagnosis._protocol_file import earlier_protocols, protocol_text, table_name
+
+FIGURES = (
+    "worst_cycle", "loops", "screening", "likeness", "error_by_course", "error_by_state", "what_is_left",
+)  # fmt: skip
+ENDINGS = ("svg", "pdf", "png")
 
 
 def publish_diagnosis(
-    folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str], figures: str | None = None
+    folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str], figures: Sequence[str] = ()
 ) -> dict[str, Path]:
     """Write ``diagnosis.html``, ``diagnosis.json`` and the next protocol below ``folder``.
 
-    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns the paths to report, by what
-    they are.
+    ``figures`` are the `ENDINGS` of figures for papers. What an earlier diagnosis wrote there and this one does not, a
+    protocol or figures, is taken away last: beside the new page it would be taken for its own. Returns the paths to
+    report, by what they are.
     """
     page = folder / "diagnosis.html"
     written = {"report": page}
@@ -29,9 +36,22 @@ def publish_diagnosis(
         write_text(folder / protocol_file, protocol_text(following.steps, [following.says]))
     write_text(folder / "diagnosis.json", json_text(found.to_dict()))
     write_diagnosis_page(page, found, f"Diagnosis of {title}", facts, protocol_file)
-    if figures is not None:
+    kept = set(written.values())
+    if figures:
         from smartshoe.report.paper.diagnosis import write_figures
 
         written["figures"] = make_folder(folder / "figures")
-        write_figures(written["figures"], found, figures)
+        kept |= set(write_figures(written["figures"], found, figures))
+    for path in earlier_files(folder):
+        if path not in kept:
+            path.unlink(missing_ok=True)
+            with suppress(OSError):  # a folder that is not empty is kept
+                path.parent.rmdir()
     return written
+
+
+def earlier_files(folder: Path) -> list[Path]:
+    """The protocols and figures in ``folder`` that a diagnosis wrote there, and another one may not write again."""
+    names = (f"diagnosis_{name}.{ending}" for name in FIGURES for ending in ENDINGS)
+    figures = [path for name in names if (path := folder / "figures" / name).is_file()]
+    return [*earlier_protocols(folder), *figures]

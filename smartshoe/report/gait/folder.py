@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,11 @@ TIME_FORMAT, FORMAT = "%.9g", "%.6g"  # formats of the table of forces, whose lo
 
 
 def publish_gait(
-    folder: Path, found: GaitResult, title: str, facts: Mapping[str, str], figures: str | None = None
+    folder: Path, found: GaitResult, title: str, facts: Mapping[str, str], figures: Sequence[str] = ()
 ) -> dict[str, Path]:
     """Write ``gait.html``, ``gait.json``, ``strides.csv``, ``events.csv`` and ``forces.csv`` below ``folder``.
 
-    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns the paths by what they are.
+    ``figures`` are the endings (svg, pdf, png) of figures for papers. Returns the paths by what they are.
     ``forces.csv`` is a plain table, which ``smartshoe gait`` can read as a trial.
     """
     from smartshoe.version import __version__
@@ -36,7 +36,7 @@ def publish_gait(
         write_text(written[table], text)
     write_text(written["forces"], forces_text(found.columns()))
     write_gait_page(written["report"], found, f"Gait: {title}", {**facts, "smartshoe": __version__})
-    if figures is not None:
+    if figures:
         from smartshoe.report.paper.gait import write_figures
 
         written["figures"] = make_folder(folder / "figures")

@@ -132,8 +132,11 @@ def figures_of(unit: UnitReport) -> Iterator[tuple[str, Figure]]:
     yield "residuals", residuals(unit.validation.traces)
 
 
-def write_figures(folder: Path, units: Sequence[UnitReport], ending: str) -> list[Path]:
-    """Write each unit's figures as ``UNIT_WHAT.ending`` (svg, pdf, png) below ``folder``; returns the paths."""
+def write_figures(folder: Path, units: Sequence[UnitReport], endings: Sequence[str]) -> list[Path]:
+    """Write each unit's figures as ``UNIT_WHAT`` with each of ``endings`` below ``folder``; returns the paths."""
     return [
-        save(figure, folder / f"{unit.name}_{what}.{ending}") for unit in units for what, figure in figures_of(unit)
+        path
+        for unit in units
+        for what, figure in figures_of(unit)
+        for path in save(figure, folder, f"{unit.name}_{what}", endings)
     ]

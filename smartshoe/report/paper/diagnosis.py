@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -35,6 +35,8 @@ def figures_of(diagnosis: Diagnosis) -> Iterator[tuple[str, Figure]]:
             yield name, figure
 
 
-def write_figures(folder: Path, diagnosis: Diagnosis, ending: str) -> list[Path]:
-    """Write the figures as ``diagnosis_WHAT.ending`` (svg, pdf, png) below ``folder``; returns the paths."""
-    return [save(figure, folder / f"diagnosis_{name}.{ending}") for name, figure in figures_of(diagnosis)]
+def write_figures(folder: Path, diagnosis: Diagnosis, endings: Sequence[str]) -> list[Path]:
+    """Write the figures as ``diagnosis_WHAT`` with each of ``endings`` below ``folder``; returns the paths."""
+    return [
+        path for name, figure in figures_of(diagnosis) for path in save(figure, folder, f"diagnosis_{name}", endings)
+    ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,15 +44,17 @@ def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
     return (x[index], *(signal[index] for signal in signals))
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write the figure in the format of ``path``'s ending (svg, pdf, png), completely or not at all; returns the path.
+def save(figure: Figure, folder: Path, name: str, endings: Sequence[str]) -> list[Path]:
+    """Write the figure as ``name.ending`` for each of ``endings`` (svg, pdf, png), each file whole or not at all.
 
-    The same figure always gives the same bytes.
+    The same figure always gives the same bytes. Returns the paths.
     """
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(path.suffix[1:])
-    with mpl.rc_context(STYLE), replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], dpi=200, metadata=metadata)
-    return path
+    written = [folder / f"{name}.{ending}" for ending in endings]
+    for path, ending in zip(written, endings, strict=True):
+        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(ending)
+        with mpl.rc_context(STYLE), replacing(path) as temporary:
+            figure.savefig(temporary, format=ending, dpi=200, metadata=metadata)
+    return written
 
 
 def figure_of(width: float, height: float, columns: int, rows: int = 1) -> tuple[Figure, list[Any]]:

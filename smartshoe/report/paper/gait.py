@@ -244,11 +244,13 @@ def variability(found: GaitResult) -> Figure | None:
         return figure
 
 
-def write_figures(folder: Path, found: GaitResult, ending: str) -> list[Path]:
-    """Write the trial's figures (svg, pdf, png by ``ending``) below ``folder``; returns their paths."""
+def write_figures(folder: Path, found: GaitResult, endings: Sequence[str]) -> list[Path]:
+    """Write the trial's figures with each of ``endings`` below ``folder``; returns their paths."""
     drawn = {
         "trial": course(found), "strides": strides(found), "butterfly": butterfly(found), "units": regions(found),
         "phases": phases(found), "memberships": memberships(found), "centre": centre(found),
         "variability": variability(found),
     }  # fmt: skip
-    return [save(figure, folder / f"{what}.{ending}") for what, figure in drawn.items() if figure is not None]
+    return [
+        path for what, figure in drawn.items() if figure is not None for path in save(figure, folder, what, endings)
+    ]

@@ -296,7 +296,7 @@
     }
     const note = document.createElement("p");
     note.className = "note";
-    note.textContent = (every > 1 ? "One in " + every + " of the " : "All ") + seen.length + " points that are shown"
+    note.textContent = (every > 1 ? table.tBodies[0].rows.length + " of the " : "All ") + seen.length + " points that are shown"
       + (chart.of > data.x.length ? "; the record has " + chart.of + " samples, of which the page keeps " + data.x.length + " with every extreme." : ".");
     const box = details.querySelector(".scroll");
     box.replaceChildren(table, note);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def _publish_diagnosis(
-    unit: UnitResult, folder: Path, result: ScenarioResult, figures: str | None
+    unit: UnitResult, folder: Path, result: ScenarioResult, figures: Sequence[str]
 ) -> DiagnosisLink | None:
     """Write the unit's diagnosis into a folder of its own, and its extended calibration next to the plain one."""
     from smartshoe.report.diagnosis.folder import publish_diagnosis
@@ -56,10 +57,10 @@ def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
     )
 
 
-def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str | None = None) -> Path:
+def publish(result: ScenarioResult, folder: Path, result_json: str, figures: Sequence[str] = ()) -> Path:
     """Write ``report.html``, ``result.json`` and ``calibrations/UNIT.json`` below ``folder``; returns the report.
 
-    ``figures`` is the format (svg, pdf, png) of figures for papers; None means no figures.
+    ``figures`` are the endings (svg, pdf, png) of figures for papers.
     """
     calibrations = make_folder(folder / "calibrations")
     for unit in result.units:
@@ -78,7 +79,7 @@ def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str
     commands = [f"smartshoe run {result.source} --seed {result.scenario.seed} --out {folder}"]
     if any(not unit.recordings for unit in result.scenario.unit):
         commands.append(f"smartshoe simulate {result.source} --seed {result.scenario.seed} --out recordings")
-    if figures is not None:
+    if figures:
         from smartshoe.report.paper.calibration import write_figures
 
         write_figures(make_folder(folder / "figures"), units, figures)

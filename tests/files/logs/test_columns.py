@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.files.logs import Column, Sheet, read, write
@@ -52,6 +54,31 @@ def test_two_loads_are_left_to_the_user() -> None:
 def test_a_voltage_is_no_load_beside_a_force() -> None:
     found = recording_from(sheet("time|s", "force|V", "cell|N"))
     assert (found.load.unit.symbol, found["force_other"].unit.symbol) == ("N", "V")
+
+
+def test_a_column_whose_name_the_load_took_is_chosen_by_the_name_that_messages_call_it() -> None:
+    log = sheet("time|s", "force|N", "pressure|mbar", format_="plain")
+    found = recording_from(log, force="pressure")
+    with pytest.raises(MissingChannelError, match=r"--sensor, for example --sensor 'force_other'"):
+        _ = found.sensor
+    assert roles(recording_from(log, force="pressure", sensors=["force_other"])) == {
+        "force_other": "sensor",
+        "force": "load",
+    }
+
+
+@given(st.integers(2, 5))
+def test_columns_of_one_title_are_chosen_by_the_names_that_messages_call_them(count: int) -> None:
+    log = sheet("time|s", "Load|N", *["Pin|V"] * count)
+    for k, column in enumerate(log.columns[2:]):
+        column.values = column.values + k
+    for name, channel in recording_from(log).channels.items():
+        if name not in ("force", "Pin"):
+            (chosen,) = recording_from(log, sensors=[name]).sensors
+            np.testing.assert_array_equal(chosen.values, channel.values)
+    for beyond in (1, count + 1):
+        with pytest.raises(MissingChannelError, match=f"no column 'Pin_{beyond}'"):
+            recording_from(log, sensors=[f"Pin_{beyond}"])
 
 
 @pytest.mark.parametrize("choice", ["Pin", "pin", "Pin[V]", "3", "3[V]"])

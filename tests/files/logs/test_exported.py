@@ -43,7 +43,7 @@ def test_loadsol_s_lost_packets_are_missing_not_minus_one(tmp_path: Path) -> Non
     for name in ("left_heel", "left_meta4", "left_total"):
         assert found[name].present.tolist() == [k != 4 for k in range(10)]
     assert found["right_heel"].present.all()
-    assert any("1 samples of the left insole did not arrive" in note for note in found.notes)
+    assert any("1 sample of the left insole did not arrive" in note for note in found.notes)
 
 
 def test_loadsol_s_rounded_times_are_put_even_and_a_real_gap_is_told(tmp_path: Path) -> None:

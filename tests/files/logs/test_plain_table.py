@@ -1,7 +1,14 @@
 """The plain table: exact round trip, and one sentence with the line for everything that does not fit."""
 
+import bz2
+import gzip
+import io
+import lzma
 import os
+import re
 import string
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -178,6 +185,30 @@ def test_places_that_hold_no_file(tmp_path: Path) -> None:
     path = tmp_path / "binary.csv"
     path.write_bytes(bytes(range(256)))
     with pytest.raises(FormatError, match="binary"):
+        smartshoe.read(path)
+
+
+def _zipped(text: bytes) -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        archive.writestr("table.csv", text)
+    return held.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("pack", "says"),
+    [
+        (gzip.compress, "packed by gzip: unpack it (gunzip)"),
+        (bz2.compress, "packed by bzip2: unpack it (bunzip2)"),
+        (lzma.compress, "packed by xz: unpack it (unxz)"),
+        (_zipped, "a zip archive or a workbook: unpack it and name a file of it, or export the sheet as CSV"),
+    ],
+)
+@pytest.mark.parametrize("name", ["table.csv.packed", "table.csv"])
+def test_a_packed_table_is_to_be_unpacked(tmp_path: Path, pack: Callable[[bytes], bytes], says: str, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(pack(b"time_s,force_n,pressure_mbar\n0,0,0\n1,1,1\n"))
+    with pytest.raises(FormatError, match=f"^{re.escape(f'{path} is {says}')}$"):
         smartshoe.read(path)
 
 

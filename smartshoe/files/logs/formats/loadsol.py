@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.display import counted
 from smartshoe.errors import FormatError
 from smartshoe.files.logs._exported import lines_of, numbers_below
 from smartshoe.files.logs._sheet import Column, Format, Sheet
@@ -63,7 +64,8 @@ def read(path: Path) -> Sheet:
     notes = ["The zones heel, medial and lateral are taken as heel, meta1 and meta4."]
     for side, rows in lost.items():
         if rows.any():
-            notes.append(f"{int(rows.sum())} samples of the {side} insole did not arrive (-1 in its zones): missing.")
+            lost_samples = counted(int(rows.sum()), "sample")
+            notes.append(f"{lost_samples} of the {side} insole did not arrive (-1 in its zones): missing.")
     if moved:
         notes.append("The insoles' clocks differ: the second was put on the first one's times.")
     comment = lines[1].removeprefix("comment").strip()
