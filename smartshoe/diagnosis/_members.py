@@ -131,7 +131,8 @@ def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterio
     """For each kind of which there are several ``members``, these as one, called by the largest.
 
     Where a delay stands beside a clock drift either takes most of the other's part, so that each alone does little,
-    while what both do may be the largest cause of all. Not those that undo one another, which follow what neither is.
+    while what both do may be the largest cause of all. Not those that undo one another, which follow what neither is,
+    nor curves: two of them in a row follow what any curve does, and are compared with that (`Member.is_any_curve`).
     """
     likelihood, departure = extended.likelihood, evidence.thresholds.departure
     whole, made = _residuals(likelihood, extended), []
@@ -139,7 +140,9 @@ def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterio
         own = [one for one in members if one.effect.kind == kind]
         others = [one for one in members if one.effect.kind != kind]
         names = [one.name for one in own]
-        if len(own) < 2 or do_cancel(*contributed_rms(likelihood.sessions, extended.model, names), evidence.thresholds):
+        if len(own) < 2 or all(one.effect.is_memoryless for one in own):
+            continue
+        if do_cancel(*contributed_rms(likelihood.sessions, extended.model, names), evidence.thresholds):
             continue
         largest = max(own, key=lambda one: (not one.effect.is_flexible, one.size))
         without = fit(likelihood, extended.model.without(*names), FEW_STEPS)

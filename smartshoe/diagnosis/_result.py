@@ -69,11 +69,14 @@ class Rival:
 
     @property
     def says(self) -> str:
-        """How probable it is in the cause's place, as "is less likely by 12"; for a fit, how much worse it fits."""
+        """How probable it is in the cause's place, as "is less likely by 12"; for a fit, how much worse it fits.
+
+        "Only" where that is less than 10, which is strong evidence.
+        """
         size, of_fit = abs(self.margin), self.by == "fit"
         if size < 0.5:
             return "fits as well" if of_fit else "is as likely"
-        by = f"{size:,.0f}" if size >= 10.0 else f"{size:.2g}"
+        by = f"{size:,.0f}" if size >= 10.0 else f"only {size:.2g}"
         if self.margin > 0.0:
             return f"{'fits worse' if of_fit else 'is less likely'} by {by}"
         return f"{'fits better' if of_fit else 'is likelier'} by {by}"

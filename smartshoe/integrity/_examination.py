@@ -249,7 +249,7 @@ def _lack_of_channels(recording: Recording) -> str | None:
     if not recording.of_role("load"):
         commanded = recording.of_role("command")
         taken = [one.name for one in recording.sensors if one.unit.quantity == "force"]
-        said = f" ({first_names(taken)} is taken as the sensor)" if taken else ""
+        said = f" ({first_names(taken)} {'is' if len(taken) == 1 else 'are'} taken as the sensor)" if taken else ""
         said = f" ({commanded[0].name} is what was asked for, not what was measured)" if commanded else said
         return (
             f"there is no reference load{said}: without it an error of the unit cannot be told from the load; name its"

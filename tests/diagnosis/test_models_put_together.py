@@ -81,6 +81,13 @@ def test_what_a_calibration_gives_of_the_same_recordings_is_said(parts: Any) -> 
     assert force.model.names == parts.found.fit.model.names
 
 
+def test_what_a_filter_would_make_of_spikes_is_said(parts: Any) -> None:
+    parts.limit_unsound_readings = ["by spikes"]
+    assert run_diagnosis(parts).limits == ("limit", "by spikes")
+    (force, scale, thresholds), _ = parts.seen["limit_unsound_readings"]
+    assert (force.fine, scale, thresholds) == ([FINE], SCALE, STANDARD)
+
+
 def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
     parts.wall_ratio = "no such wall"
     assert run_diagnosis(parts).limits == ("limit", "no such wall")

@@ -56,12 +56,12 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         is_no_unit=False, clocks=(), is_moved=False, thresholds=STANDARD,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
-    core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
-    other = SimpleNamespace(effect=effect("dead_band"), size=0.25, name="dead_band")
+    core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation", kin=())
+    other = SimpleNamespace(effect=effect("dead_band"), size=0.25, name="dead_band", kin=())
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
         can_validate=True, refused=(), cancelling_names=(), best_single=None, screening=SCREENING,
-        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest_law=None,
+        likeness=np.eye(6), own_gains=(), zero_changes=(), nearest_law=None, together=(),
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size, kinds[2].sd_of_mean = "memory", 0.07, lambda lasts_s: ("wanders", lasts_s)
@@ -75,6 +75,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         sizes={"linear_leak": 0.1, "delay": 0.3},
         not_undone=[],
         limit_calibration_off=[],
+        limit_unsound_readings=[],
         unproven=0.0,
         beyond=0.0,
         judged=1.0,
@@ -120,6 +121,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("mean_offset", 0.02)
     monkeypatch.setattr(_force, "mean_offset", lambda *_: 0.02)
     answer("limit_calibration_off", lambda *_: list(made.limit_calibration_off))
+    answer("limit_unsound_readings", lambda *_: list(made.limit_unsound_readings))
     answer("compensation", lambda fine, model, *_: Compensation(fine, model, EXTENDED_N, PLAIN_N, EXTENDED_N, FILTER))
     answer("next_experiment", "next")
     answer("_trace", "trace")
@@ -143,7 +145,7 @@ def run_diagnosis(parts: Any, thresholds: Thresholds = STANDARD) -> Any:
 
 
 def name_of(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, kind: float = 0.9) -> Any:
-    known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
+    known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name, kin=())
     return SimpleNamespace(
         name=name,
         kind_only=kind_only,

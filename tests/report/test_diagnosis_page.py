@@ -129,7 +129,7 @@ def test_a_likelier_effect_is_not_told_as_ruled_out_and_an_equation_that_is_not_
     made = replace(case("one cause"), causes=(cause,))
     html = write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8")
     text = plain_text(html)
-    likelier, out = text.index("alone in its place as likely or likelier"), text.index("came near, and is ruled out")
+    likelier, out = text.index("alone in its place as likely or likelier"), text.index("came near, and is less likely")
     assert likelier < text.index("clock drift is likelier by 155") < out < text.index("dead band is less likely by 45")
     beside = "hese parameters are of the equation of sensor lag, which is not in the extended model"
     assert not _is_folded(html, beside)
@@ -230,7 +230,7 @@ def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be()
         "No other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88. Family:" in text
     )
     assert "In the extended model without being causes, too small or too unsure for a name: sensor lag." in text
-    for heading in ("cannot be ruled out", "came near, and is ruled out"):
+    for heading in ("cannot be ruled out", "came near, and is less likely"):
         assert f"{heading} in the place of this one what it would be what tells the two apart" in text
     assert "bouc wen hysteresis fits worse by 1.7 " in text
     assert "dead band is less likely by 45 " in text

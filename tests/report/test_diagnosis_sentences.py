@@ -34,7 +34,7 @@ from smartshoe.report.diagnosis._sentences import (
     on_causes,
     parameter_text,
     percent_of_whole,
-    ruled_out,
+    less_likely,
     shares,
     shares_text,
     two_numbers,
@@ -57,14 +57,14 @@ def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weig
     )
 
 
-def test_a_rival_that_is_likelier_is_told_as_such_and_not_as_ruled_out() -> None:
+def test_a_rival_that_is_likelier_is_told_as_such_and_not_as_less_likely() -> None:
     """Also beside effects that cannot be ruled out; a difference below one half is none."""
     near = (Rival("clock_drift", -155.0), Rival("zero_drift", 0.4), Rival("delay", 0.6), Rival("dead_band", 45.0))
     cause = replace(LEAK_CAUSE, rivals=near)
     assert [(one.name, one.margin) for one in likelier(cause)] == [
         ("clock drift", "is likelier by 155"), ("zero drift", "is as likely"),
     ]  # fmt: skip
-    assert [(one.name, one.margin) for one in ruled_out(cause)] == [
+    assert [(one.name, one.margin) for one in less_likely(cause)] == [
         ("delay", "is less likely by 0.6"), ("dead band", "is less likely by 45"),
     ]  # fmt: skip
     alone = "clock drift alone in its place is likelier by 155"

@@ -169,5 +169,5 @@ def _card(number: int, cause: Cause) -> Card:
         sentence(sentences.why_this_one(cause)),
         sentences.neighbours(cause, cause.equivalents),
         sentences.likelier(cause),
-        sentences.ruled_out(cause),
+        sentences.less_likely(cause),
     )

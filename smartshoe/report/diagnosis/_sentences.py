@@ -341,8 +341,8 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
     return found
 
 
-def ruled_out(cause: Cause) -> list[Neighbour]:
-    """The rivals that fitted nearly as well but can be ruled out."""
+def less_likely(cause: Cause) -> list[Neighbour]:
+    """The rivals that came near and are less likely, or fit worse, than the cause."""
     return neighbours(cause, [rival.effect for rival in _others(cause) if not rival.may_be_likelier])
 
 
