@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from test_procedure_by_hand import BEFORE, MODEL, STANDARD
-from told_diagnosis import EXTENDED_N, FILTER, FINE, PLAIN_N, name_of, run_diagnosis
+from told_diagnosis import EXTENDED_N, FILTER, FINE, PLAIN_N, SCALE, name_of, run_diagnosis
 
 from smartshoe.diagnosis import _force, _procedure
 from smartshoe.diagnosis._force import Compensation, ForceError
