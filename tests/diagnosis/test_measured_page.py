@@ -35,7 +35,7 @@ FIGURES = 0.03  # of a quoted figure
 SURE = 0.06  # of a quoted confidence: nearer than its classes (0.4, half, 0.9) are to one another
 PERCENT = 0.5
 EARLIER_S = 0.1  # of a quoted delay
-FOLDERS = {"actuator": "pneumatic_actuator_friction_leak/friction", "vessels": "pneumatic_actuator_friction_leak/leak"}
+VESSELS = "pneumatic_actuator_friction_leak/leak"
 HANGING = {"validation_dataset_3"}  # its causes hang on last digits
 COMMANDS = [line for line in PAGE.splitlines() if line.startswith("smartshoe diagnose ")]
 SLOW = ("air_", "microfluidic_", "vhb_0d01.csv vhb", "Circle_3", "ensaio1.1", "dataset_3", "17September")
@@ -172,7 +172,7 @@ class TestActuator:
 @pytest.mark.parametrize("vessel", list(_table("vessel", "lost")))
 def test_how_vessels_empty(measured: Path, vessel: str) -> None:
     lost, onset, whole, order = _table("vessel", "lost")[vessel]
-    decay = decay_of(read(measured / FOLDERS["vessels"] / f"{vessel}.csv", time="1[ms]", sensors=["3[bar]"]))
+    decay = decay_of(read(measured / VESSELS / f"{vessel}.csv", time="1[ms]", sensors=["3[bar]"]))
     assert decay is not None
     assert decay.lost_percent == pytest.approx(_numbers(lost)[0], rel=0.02)
     assert decay.tau_s / (3600.0 if onset.endswith("h") else 1.0) == pytest.approx(_numbers(onset)[0], rel=FIGURES)
@@ -294,13 +294,13 @@ def _shares(found: Told) -> list[float]:
     return [found[model]["variance_explained_percent"] for model in ("baseline", "extended")]
 
 
-SETS = {  # of the page: its command begins with, its files in test_measured_cases
-    "air channel, sweeps": ("air_sweep", "air"),
-    "velostat": ("velostat", "velostat"),
-    "VHB, two rates": ("vhb_0d01.csv vhb_0d03", "vhb_two_rates"),
-    "VHB, one rate": ("vhb_0d01.csv --hold", "vhb_one_rate"),
-    "microfluidic": ("microfluidic", "microfluidic"),
-    "air channel, whole record": ("air_whole", ""),
+SETS = {  # of the page: its command begins with, its files in test_measured_cases, its case in the page's summary
+    "air channel, sweeps": ("air_sweep", "air", "air channel, sweeps"),
+    "velostat": ("velostat", "velostat", "velostat"),
+    "VHB, two rates": ("vhb_0d01.csv vhb_0d03", "vhb_two_rates", "VHB strip, two rates"),
+    "VHB, one rate": ("vhb_0d01.csv --hold", "vhb_one_rate", "VHB strip, one rate"),
+    "microfluidic": ("microfluidic", "microfluidic", "microfluidic sensor"),
+    "air channel, whole record": ("air_whole", "", "air channel, whole record"),
 }
 
 
@@ -309,9 +309,10 @@ SETS = {  # of the page: its command begins with, its files in test_measured_cas
 )
 def test_sensors_of_other_laboratories(measured: Path, name: str) -> None:
     plain, shares, named, _ = _table("set", "held-out variance explained")[name]
-    begins, files = SETS[name]
+    begins, files, case = SETS[name]
     command = next(one for one in COMMANDS if one.startswith(f"smartshoe diagnose {begins}"))
     found = _run(_folder(measured, command), command)
+    assert found["verdict"] == _table("case", "verdict")[case][0].replace(" ", "_")
     assert _shares(found) == pytest.approx(_numbers(shares), abs=PERCENT)
     _is_named(named, found["causes"])
     if files:
