@@ -46,10 +46,10 @@ def _insole(measured: Path, name: str, rows_hz: float, taxel: str = "mean_active
     folder = measured / "insole_plenum"
     taxels = np.genfromtxt(folder / f"{name}_C.csv", delimiter=",", names=True)
     reference = np.genfromtxt(folder / f"{name}_P.csv", delimiter=",", names=True)["P_bar"]
-    return _insole_of(taxels["t_s"], taxels[taxel], reference, rows_hz)
+    return insole_of(taxels["t_s"], taxels[taxel], reference, rows_hz)
 
 
-def _insole_of(time_s: Array, counts: Array, reference_bar: Array, rows_hz: float) -> Recording:
+def insole_of(time_s: Array, counts: Array, reference_bar: Array, rows_hz: float) -> Recording:
     """Reference pressure as the force on 1 cm2, its rows at ``rows_hz`` from the taxels' first sample on."""
     since_s = time_s - time_s[0]
     rows_s = np.arange(reference_bar.size) / rows_hz
@@ -169,7 +169,7 @@ class TestInsole:
 
         experiment = loadmat(measured / "insole_plenum" / "calibration_dataset.mat")["experiment"][0, 0]
         rows, reference = experiment["C"].astype(float), experiment["P"].ravel()
-        found = diagnose(_insole_of(rows[:, 1], rows[:, 2 + SATURATED_TAXEL], reference, INSOLE_ROWS_HZ))
+        found = diagnose(insole_of(rows[:, 1], rows[:, 2 + SATURATED_TAXEL], reference, INSOLE_ROWS_HZ))
         assert found.verdict == "refused"
         assert "exactly 0 counts" in _fault(found, "saturation")
 
@@ -211,7 +211,7 @@ KINDS = {  # one of which is the first cause, by least-squares ladders over the 
 POLES_PER_S = np.geomspace(0.01, 30.0, 25)
 
 
-def _files(measured: Path, pattern: str, column: str) -> list[Recording]:
+def sensor_files(measured: Path, pattern: str, column: str) -> list[Recording]:
     paths = sorted((measured / "sensors").glob(f"{pattern}.csv"))
     if not paths:
         pytest.skip(f"no {pattern}.csv among the measured files")
@@ -233,7 +233,7 @@ def _shaken(recordings: list[Recording], seed: int) -> list[Recording]:
 @cache
 def _sensor(measured: Path, name: str, seed: int = 0) -> Diagnosis:
     fit, hold, column = SENSORS[name]
-    fitted, judges = _files(measured, fit, column), _files(measured, hold, column)
+    fitted, judges = sensor_files(measured, fit, column), sensor_files(measured, hold, column)
     return diagnose(_shaken(fitted, seed), hold_out=_shaken(judges, seed + 10 if seed else 0))
 
 
@@ -304,9 +304,9 @@ class TestSensors:
     def test_of_rates_farther_apart_the_curve_is_told_and_one_cause_beside_it_at_most(
         self, measured: Path, seed: int
     ) -> None:
-        """What relaxes in 23 of 32 draws; a set in five and friction in three of the others, which are wrong."""
-        files = _shaken(_files(measured, "vhb_0d0[15]", "position_mm"), seed)
-        found = diagnose(files, hold_out=_shaken(_files(measured, "vhb_0d03", "position_mm"), seed + 10))
+        """What relaxes in five of eleven draws; a set in two and friction in one of the others, which are wrong."""
+        files = _shaken(sensor_files(measured, "vhb_0d0[15]", "position_mm"), seed)
+        found = diagnose(files, hold_out=_shaken(sensor_files(measured, "vhb_0d03", "position_mm"), seed + 10))
         families = [cause.effect.family for cause in found.causes]
         assert families.count("static_curve") == 1
         assert len(families) <= 2  # two load cycles
@@ -317,7 +317,7 @@ class TestSensors:
     @pytest.mark.parametrize("seed", [0, 1, 2])
     def test_a_curve_and_no_wrong_kind_is_told_of_three_rates(self, measured: Path, seed: int) -> None:
         """What relaxes is in the extension, and is named in some draws; last digits hang on the processor, too."""
-        found = diagnose(_shaken(_files(measured, "vhb_0d0[135]", "position_mm"), seed))
+        found = diagnose(_shaken(sensor_files(measured, "vhb_0d0[135]", "position_mm"), seed))
         assert {"static_curve"} <= {cause.effect.family for cause in found.causes} <= KINDS["vhb_two_rates"]
         assert {"power_law_creep", "second_relaxation"} & {*found.minor, *(cause.name for cause in found.causes)}
         assert found.extended is not None
@@ -343,7 +343,7 @@ class TestSensors:
     ) -> None:
         """No equation follows it, so that nothing is sure; the curve does most by itself, whatever is fitted."""
         fit, hold, column = SENSORS["microfluidic"]
-        fitted, judges = _files(measured, fit, column), _files(measured, hold, column)
+        fitted, judges = sensor_files(measured, fit, column), sensor_files(measured, hold, column)
         if which == "swapped":
             fitted, judges = judges, fitted
         found = diagnose(fitted[::2] if which == "three speeds" else fitted, hold_out=judges)
@@ -370,7 +370,7 @@ class TestSensors:
 
         What is sure at all is the curve, which is there.
         """
-        found = diagnose(_shaken(_files(measured, "air_whole", "pressure_v"), seed))
+        found = diagnose(_shaken(sensor_files(measured, "air_whole", "pressure_v"), seed))
         assert "static_curve" in {cause.effect.family for cause in found.causes}
         for cause in found.causes:
             if cause.effect.family != "static_curve":
@@ -384,7 +384,7 @@ class TestSensors:
     @pytest.mark.parametrize("name", _few(SENSORS))
     def test_the_baseline_is_as_good_as_a_plain_standard_linear_solid(self, measured: Path, name: str) -> None:
         fit, hold, column = SENSORS[name]
-        plain = plain_solid_percent(_files(measured, fit, column), _files(measured, hold, column))
+        plain = plain_solid_percent(sensor_files(measured, fit, column), sensor_files(measured, hold, column))
         standing = _sensor(measured, name).to_dict()["baseline"]
         assert standing["variance_explained_percent"] > plain - 2.0, f"a plain fit explains {plain:.1f} %"
 

@@ -51,6 +51,52 @@ def typical(one: Effect) -> Array:
     return np.array([v if p.null is None else p.size for p, v in zip(one.parameters, one.start(), strict=True)])
 
 
+ONE_WAY = r"\b(rises|falls|drops|creeps|grows|shrinks|gains|loses|higher|lower)\b"
+
+
+@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
+def test_an_effect_of_either_sign_says_nothing_that_holds_for_one_sign_only(one: Effect) -> None:
+    for as_said in (one, one.of_any_sensor()):
+        strengths = [p for p in as_said.parameters if p.null is not None]
+        if any(p.lower < p.null < p.upper for p in strengths):  # type: ignore[operator]
+            assert not re.search(ONE_WAY, as_said.says) or re.search(r"\bor\b", as_said.says), as_said.says
+
+
+@pytest.mark.parametrize("bow", [0.01, 0.1, 0.25])
+@pytest.mark.parametrize(
+    ("name", "shapes", "steepest_at_rest"),
+    [
+        ("wall_hardening", (-0.3, 0.0, 1.0), True),  # "flattest at high loads"
+        ("contact_area", (0.1, 0.6, 1.2), True),  # "steepest at low loads"
+        ("gas_compression", (None,), False),  # "bent upwards, ever steeper"
+    ],
+)
+def test_curves_bend_the_way_that_they_say(
+    name: str, shapes: tuple[float | None, ...], steepest_at_rest: bool, bow: float
+) -> None:
+    load = np.linspace(0.0, 1.0, 201)
+    for shape in shapes:
+        values = np.array([bow] if shape is None else [bow, shape])
+        conditions = Conditions(0.01 * np.arange(201), load, 0.01, relaxing=(1e-9, 1.0))
+        slope = np.diff(effect(name).apply(load, conditions, values))
+        assert np.all(np.diff(slope) < 1e-9) if steepest_at_rest else np.all(np.diff(slope) > -1e-9), shape
+
+
+@pytest.mark.parametrize(("name", "strength"), [("flexible_softening", "gained"), ("flexible_set", "set")])
+@pytest.mark.parametrize("by_stroke", [0.0, 0.5, 1.0])
+def test_a_dose_of_loading_is_what_its_strength_says(name: str, strength: str, by_stroke: float) -> None:
+    """A loading to full scale and 10 s there, of a unit that hardly slows down."""
+    step_s = 0.01
+    load = np.concatenate([[0.0, 0.5], np.ones(1001)])
+    one, size = effect(name), 0.01
+    assert "10 s there" in next(p.says for p in one.parameters if p.name == strength)
+    values = one.begun()
+    given = dict(zip([p.name for p in one.parameters], values, strict=True))
+    given |= {strength: size, "by_stroke": by_stroke, "exponent": 1.0, "early": one.parameters[-1].upper}
+    out = one.apply(load, Conditions(step_s * np.arange(load.size), load, step_s), np.array(list(given.values())))
+    assert out[-1] - 1.0 == pytest.approx(size, rel=0.02)
+
+
 def test_every_word_is_said_and_channels_are_among_them() -> None:
     assert set(SAYS) == WORDS
     assert CHANNELS < WORDS

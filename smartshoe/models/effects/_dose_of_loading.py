@@ -34,7 +34,7 @@ def shape_parameters(most_early: float) -> tuple[EffectParameter, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Dose:
-    """What grows with the dose, by about ``size`` with the first loading to full scale."""
+    """What grows with the dose, by about ``size`` with the first loading to full scale and 10 s there."""
 
     size: float
     by_stroke: float

@@ -46,7 +46,7 @@ class FlexibleLoop(Effect):
 
     name, family, stage, place = "flexible_loop", "hysteresis", "wall", "wall"
     is_steep_undone = True
-    says = "the reading lies lower while loading than while unloading, by the same amount at any rate"
+    says = "loading and unloading give two readings of one load, by the same amount apart at any rate"
     parameters = (
         *_weights("even", "full scale", USUAL_HEIGHT),
         *_weights("growing", "the logarithmic scale of load", USUAL_HEIGHT / ((1.0 + LEAST_LOAD) * SCALE)),

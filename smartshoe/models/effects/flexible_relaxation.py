@@ -19,7 +19,7 @@ class FlexibleRelaxation(CoreEffect):
     """
 
     name, family, stage = "flexible_relaxation", "relaxation", "wall"
-    says = "the reading creeps on in holds and rests, over several times at once"
+    says = "the reading moves on in holds and rests, over several times at once"
     parameters = tuple(
         EffectParameter(
             f"share_{k}", "1", f"what relaxes at {rate:.3g} 1/s, of the load; < 0: falls in holds",

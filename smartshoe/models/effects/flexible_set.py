@@ -18,9 +18,10 @@ class FlexibleSet(Effect):
     name, family, stage, place = "flexible_set", "zero", "wall", "gas"
     says = "the unloaded reading rises with the time under load and with every loading, and stays"
     parameters = (
-        EffectParameter("set", "FS_reading", "rise by the first loading to full scale", 0.0, 0.0, 0.15, 0.003),
+        EffectParameter("set", "FS_reading", "about the rise by the first loading to full scale and 10 s there", 0.0,
+                        0.0, 0.15, 0.003),
         *shape_parameters(3000.0),
-    )
+    )  # fmt: skip
     shapes = (
         {"by_stroke": 1.0, "exponent": 1.0, "early": 300.0},
         {"by_stroke": 1.0, "exponent": 2.0, "early": 300.0},

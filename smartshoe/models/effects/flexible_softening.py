@@ -16,10 +16,10 @@ class FlexibleSoftening(Effect):
     """
 
     name, family, stage, place = "flexible_softening", "softening", "wall", "wall"
-    says = "the gain rises from cycle to cycle, by less each time"
+    says = "the gain changes from cycle to cycle, by less each time"
     parameters = (
-        EffectParameter("gained", "1", "relative rise of the gain by the first loading to full scale", 0.0, -0.05, 0.1,
-                        0.005),
+        EffectParameter("gained", "1", "about the relative change of the gain by the first loading to full scale and"
+                        " 10 s there", 0.0, -0.05, 0.1, 0.005),
         *shape_parameters(100.0),
     )  # fmt: skip
     shapes = ({"by_stroke": 1.0, "exponent": 1.0, "early": 1.0}, {"by_stroke": 1.0, "exponent": 1.0, "early": 10.0})

@@ -23,7 +23,7 @@ class RateGain(Remembering):
 
     name, family, stage, place = "rate_gain", "rate", "wall", "wall"
     is_steep_undone = True
-    says = "faster loading reads higher (or lower), up and down alike, and the reading drops where a hold begins"
+    says = "faster loading reads higher (or lower), up and down alike, and the reading jumps where a hold begins"
     parameters = (
         EffectParameter(
             "gain_per_rate", "1", "relative change of gain at one full scale a second", 0.0, -0.5, 1.0, 0.02

@@ -23,9 +23,7 @@ class WallHardening(Effect):
     name, family, stage, place = "wall_hardening", "static_curve", "wall", "wall"
     is_memoryless = True
     bends_beside_arm = True
-    says = (
-        "the wall stiffens with deformation: the reading against load is straight at first and flattens at high loads"
-    )
+    says = "the wall stiffens with deformation: the reading against load is bent, flattest at high loads"
     parameters = (
         EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.25, 0.01),
         EffectParameter("steepness", "1", "s: share of the fifth power, which comes late", None, -0.3, 1.0, 0.3),
