@@ -93,7 +93,9 @@ def _solved(design: Array, values: Array) -> tuple[Array, Array]:
     return np.linalg.lstsq(design / size, values, rcond=None)[0] / size, size
 
 
-def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: float, powers: int) -> Following:
+def _one(
+    even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: float, powers: int, *, at_one_rate: bool
+) -> Following:
     grid_s, pole, delay, rate = even.time_s, 1.0 / lag_s, delay_s, 0.0
     largest = float(np.abs(even.load).max()) or 1.0
     bends = [largest * (even.load / largest) ** power for power in range(2, powers + 1)]
@@ -114,7 +116,8 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
         faster = linear[3] * (even.lagged(pole * (1.0 + small)) - lagged) / small
         # The last three columns belong to delay, rate and log p.
         relaxing = np.interp(at, grid_s, faster) - linear[1] * pole * since * ends
-        design = np.column_stack([shapes, tilt, tilt * (logger_s[inside] - middle), relaxing])
+        parting = np.zeros(at.size) if at_one_rate else tilt * (logger_s[inside] - middle)
+        design = np.column_stack([shapes, tilt, parting, relaxing])
         change, size = _solved(design, values - shapes @ linear)
         residual = values - shapes @ linear - design @ change
         variance = float(residual @ residual) / max(at.size - design.shape[1], 1)
@@ -133,14 +136,24 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
     return Following(delay, float(sd[-3]), rate, float(sd[-2]), 1.0 / pole, residual, misfit)
 
 
-def follow(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float, powers: int = 1) -> Following:
+def follow(
+    machine_s: Array,
+    load: Array,
+    logger_s: Array,
+    signal: Array,
+    delay_s: float,
+    powers: int = 1,
+    *,
+    at_one_rate: bool = False,
+) -> Following:
     """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) behind ``load`` (m,) at ``machine_s`` (m,).
 
     The search begins at ``delay_s``; of the fits from the time constants `STARTS_S` the better one is returned.
     ``powers``: how many powers of the load the reading follows at once; 1 is a straight characteristic.
+    ``at_one_rate``: the two clocks go at one rate.
     """
     even = _even(machine_s, load)
-    found = [_one(even, logger_s, signal, delay_s, lag_s, powers) for lag_s in STARTS_S]
+    found = [_one(even, logger_s, signal, delay_s, lag_s, powers, at_one_rate=at_one_rate) for lag_s in STARTS_S]
     return min(found, key=lambda one: float(np.mean(one.residual**2)))
 
 

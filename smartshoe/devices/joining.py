@@ -18,6 +18,7 @@ from smartshoe.devices.following import Following, follow
 from smartshoe.errors import InputError
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Channel, Recording, Role
+from smartshoe.signals.noise import NORMAL_95
 
 LEAST_CORRELATION = 0.8
 SAME_SIGNAL = 0.98
@@ -138,23 +139,40 @@ def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array
     """Delay and clock rate between a load and the reading of a unit, excluding the unit's own lag.
 
     The unit's model is fitted together with them. Where that leaves more than noise, only the load's corners are used.
-    Where the load has no corners, the model is fitted with a bent characteristic; the delay's sd is then at least half
-    of what the bend changes. Raises `InputError` where the two do not correlate.
+    Where the load has no corners, the model is fitted with a bent characteristic. Raises `InputError` where the two do
+    not correlate.
     """
     delay, correlation = coarse(machine_s, load, logger_s, reading)
     _require_match(correlation)
     found = follow(machine_s, load, logger_s, reading, delay)
     if found.misfit <= LARGEST_MISFIT:
-        return _followed(found, found.delay_sd_s, correlation, "model")
+        sds = found.delay_sd_s, found.rate_sd
+        return Alignment(found.delay_s, sds[0], found.rate, sds[1], correlation, found.residual, "model")
     if (at := follow_corners(machine_s, load, logger_s, reading, delay)) is not None:
         return Alignment(at.delay_s, at.delay_sd_s, at.rate, at.rate_sd, correlation, found.residual, "corners")
-    bent = follow(machine_s, load, logger_s, reading, delay, POWERS)
-    changed = 0.5 * abs(bent.delay_s - found.delay_s)
-    return _followed(bent, max(bent.delay_sd_s, changed), correlation, "curve")
+    return _by_curve(machine_s, load, logger_s, reading, delay, found, correlation)
 
 
-def _followed(found: Following, delay_sd_s: float, correlation: float, by: By) -> Alignment:
-    return Alignment(found.delay_s, delay_sd_s, found.rate, found.rate_sd, correlation, found.residual, by)
+def _by_curve(
+    machine_s: Array,
+    load: Array,
+    logger_s: Array,
+    reading: Array,
+    delay_s: float,
+    straight: Following,
+    correlation: float,
+) -> Alignment:
+    """Delay and rate with a bent characteristic, with sds that count what the bend changes of each.
+
+    A smooth load tells a rate from what the unit remembers only poorly: one that is not clear of none is none.
+    """
+    logs = machine_s, load, logger_s, reading, delay_s
+    bent = follow(*logs, POWERS)
+    rate_sd = max(bent.rate_sd, abs(bent.rate - straight.rate))
+    if abs(bent.rate) < NORMAL_95 * rate_sd:
+        straight, bent = (follow(*logs, powers, at_one_rate=True) for powers in (1, POWERS))
+    delay_sd_s = max(bent.delay_sd_s, abs(bent.delay_s - straight.delay_s))
+    return Alignment(bent.delay_s, delay_sd_s, bent.rate, rate_sd, correlation, bent.residual, "curve")
 
 
 def join(machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger") -> Recording:

@@ -14,7 +14,7 @@ from smartshoe.display import Summarised, SummaryTable, panels, significant, sur
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, described
-from smartshoe.models.effects import Effect, in_words, listed
+from smartshoe.models.effects import Effect, effect, in_words, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
@@ -76,9 +76,10 @@ class Rival:
         size, of_fit = abs(self.margin), self.by == "fit"
         if size < 0.5:
             return "fits as well" if of_fit else "is as likely"
-        by = f"{size:,.0f}" if size >= 10.0 else f"only {size:.2g}"
+        by = f"{size:,.0f}" if size >= 10.0 else f"{size:.2g}"
         if self.margin > 0.0:
-            return f"{'fits worse' if of_fit else 'is less likely'} by {by}"
+            only = "" if of_fit or size >= 10.0 else "only "
+            return f"{'fits worse' if of_fit else 'is less likely'} by {only}{by}"
         return f"{'fits better' if of_fit else 'is likelier'} by {by}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -118,6 +119,12 @@ class Cause:
         return self.effect.name
 
     @property
+    def says(self) -> str:
+        """What it does to the reading: of a free form as long as laws that bend otherwise cannot be ruled out."""
+        part = effect(self.part) if self.part is not None else self.effect
+        return part.says if part.is_flexible and self.equivalents else self.effect.says
+
+    @property
     def as_likely(self) -> tuple[Rival, ...]:
         """The rivals that are at least as probable in its place, although nothing else supports them."""
         return likelier_of(self.rivals, self.equivalents)
@@ -143,7 +150,7 @@ class Cause:
             "evidence": [one.to_dict() for one in self.evidence],
             "held_out": self.held_out.to_dict(),
             "size_percent_of_full_scale": 100.0 * self.size,
-            "says": self.effect.says,
+            "says": self.says,
         }
 
 

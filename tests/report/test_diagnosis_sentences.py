@@ -28,13 +28,14 @@ from smartshoe.report.diagnosis._sentences import (
     gain_text,
     heading,
     interval,
+    less_likely,
     likelier,
+    meanings,
     not_in_the_model,
     nothing_left,
     on_causes,
     parameter_text,
     percent_of_whole,
-    less_likely,
     shares,
     shares_text,
     two_numbers,
@@ -57,6 +58,21 @@ def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weig
     )
 
 
+def test_a_free_form_says_no_more_than_all_its_laws_do() -> None:
+    """A curve that bends up and one that bends down cannot both be steepest at low loads."""
+    alone = replace(LEAK_CAUSE, effect=effect("contact_area"), part="flexible_curve", equivalents=())
+    assert alone.says == effect("contact_area").says
+    assert replace(alone, equivalents=("gas_compression",)).says == effect("flexible_curve").says
+    assert replace(alone, part="contact_area", equivalents=("gas_compression",)).says == alone.says
+
+
+def test_a_parameter_means_what_it_does_in_its_own_equation() -> None:
+    """The free form of a softening has a gain of that name, of another load cycle."""
+    law, form = effect("cycle_conditioning"), effect("flexible_softening")
+    cause = replace(LEAK_CAUSE, effect=law, part=form.name, parameters=dict.fromkeys(p.name for p in law.parameters))
+    assert meanings(cause) == {one.name: one.says for one in law.parameters}
+
+
 def test_a_rival_that_is_likelier_is_told_as_such_and_not_as_less_likely() -> None:
     """Also beside effects that cannot be ruled out; a difference below one half is none."""
     near = (Rival("clock_drift", -155.0), Rival("zero_drift", 0.4), Rival("delay", 0.6), Rival("dead_band", 45.0))
@@ -65,7 +81,7 @@ def test_a_rival_that_is_likelier_is_told_as_such_and_not_as_less_likely() -> No
         ("clock drift", "is likelier by 155"), ("zero drift", "is as likely"),
     ]  # fmt: skip
     assert [(one.name, one.margin) for one in less_likely(cause)] == [
-        ("delay", "is less likely by 0.6"), ("dead band", "is less likely by 45"),
+        ("delay", "is less likely by only 0.6"), ("dead band", "is less likely by 45"),
     ]  # fmt: skip
     alone = "clock drift alone in its place is likelier by 155"
     assert why_this_one(cause) == alone

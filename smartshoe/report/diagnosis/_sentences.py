@@ -96,8 +96,8 @@ def not_in_the_model(cause: Cause) -> str:
 
 def meanings(cause: Cause) -> dict[str, str]:
     """The meaning of each parameter of a cause, by name; '' if the catalogue does not describe it."""
-    valued = cause.effect if cause.part is None else effect(cause.part)
-    says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
+    valued = effect(cause.part) if cause.part is not None and is_free_form(cause) else cause.effect
+    says = {parameter.name: parameter.says for parameter in valued.parameters}
     return {name: says.get(name, "") for name in cause.parameters}
 
 

@@ -141,7 +141,7 @@ def _sure(cause: Cause) -> str:
 
 
 def _about(cause: Cause) -> str:
-    said = f"{in_words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
+    said = f"{in_words(cause.name)}: {cause.says}; {why_this_one(cause)}"
     return f"{said}; {cause.doubt}" if cause.doubt else said
 
 
