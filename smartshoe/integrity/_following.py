@@ -2,24 +2,28 @@
 
 A reading follows where two things hold. The load explains enough of its variance, through a curve and first-order lags.
 And the increments of both go together, over at least one time constant that a law may have: a random walk may be
-explained by chance, but does not move along. A slow unit may answer changes of the load late instead (`_answers_soon`).
+explained by chance, but does not move along. A slow unit may answer changes of the load late instead
+(`_answers_soon`), or be foretold in either half of its recording by what the other half tells (`_is_foretold`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._answers import answered_s, binned, cut_short
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.signals.lags import lagged
 
+LAGS = 16  # resolution: lags that are tried, from a bin to the recording, and half as many delays
 RISES_WITH_LOAD = ("pressure", "force")
 
 
@@ -40,7 +44,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
             explained >= follows and correlation > 0.0
         ):
             return  # few samples a ramp make a load look like noise, but noise is not followed so closely
-        if explained >= follows and _answers_soon(view):
+        if explained >= follows and (_answers_soon(view) or _is_foretold(view)):
             return
         if (froze := frozen(view)) is not None:
             yield froze
@@ -54,8 +58,9 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         if explained >= follows:
             says = (
                 f"the reading does not move with the load, though what is slow in it explains {100 * explained:.0f} %"
-                f" of its variance: were both recorded by one clock, is this the unit that was pressed, and does it"
-                f" answer within {max(memory_s):g} s (of a slower one record several steps of the load)?"
+                " of its variance, and what one half of the recording tells does not foretell the other: were both"
+                " recorded by one clock, and is this the unit that was pressed (of a slow one record several steps of"
+                " the load)?"
             )
         if view.thresholds.clear * (moved_at_rest := _share_moved_at_rest(view)) > 1.0:
             says = (
@@ -111,6 +116,53 @@ def _answers_soon(view: View) -> bool:
         if late_s is not None and 0.0 <= late_s <= max(time_constant_s, width_s):
             return True
     return False
+
+
+@on_one_thread
+def _is_foretold(view: View) -> bool:
+    """Whether a slow unit, as either half of the recording tells it, foretells most of the other half's reading.
+
+    The unit is the plain one: the load, after some delay, and the same behind one lag, of whatever time the recording
+    holds. Each half has an offset, a drift and a past of its own. A random course is often explained by chance, but
+    what explains one half of it does not foretell the other: less than half of the squares (`clear`) must be left.
+    """
+    given, duration_s = view.thresholds, float(view.time_s[-1] - view.time_s[0])
+    bins = min(given.bins, view.time_s.size)
+    step_s, middle = duration_s / bins, bins // 2
+    grid = view.time_s[0] + (np.arange(bins) + 0.5) * step_s
+    load, reading = (
+        binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
+    )
+    load, halves = (load - load.min()) / np.ptp(load), (slice(0, middle), slice(middle, bins))
+    best = [(np.inf, np.inf, 0.0)] * 2  # of the unit told by either half: squares left there, in the other, and all
+    for lag_s, delay in product(np.geomspace(step_s, duration_s, LAGS), np.unique(np.r_[0, _delays(bins)])):
+        delayed = np.concatenate([np.full(delay, load[0]), load[: bins - delay]])
+        columns = np.stack([delayed, lagged(delayed, step_s, float(lag_s)), reading], axis=1)
+        first, second = (_without_past(columns[half], lag_s / step_s) for half in halves)
+        for place, (one, other) in enumerate(((first, second), (second, first))):
+            weights = _two_weights(one)
+            left, left_in_other = (float(np.sum((half[:, 2] - half[:, :2] @ weights) ** 2)) for half in (one, other))
+            if left < best[place][0]:
+                best[place] = left, left_in_other, float(np.sum(other[:, 2] ** 2))
+    return given.clear * sum(one[1] for one in best) < sum(one[2] for one in best)
+
+
+def _delays(bins: int) -> Index:
+    """(k,) delays to try, in bins, up to an eighth of a recording."""
+    return np.rint(np.geomspace(1, max(bins // 8, 1), LAGS // 2)).astype(np.intp)
+
+
+def _without_past(columns: Array, lag: float) -> Array:
+    """(n, k) ``columns`` less what an offset, a drift and a past that fades with a ``lag``, in samples, explain."""
+    at = np.arange(len(columns))
+    past = np.linalg.qr(np.stack([np.ones(at.size), at, np.exp(-at / lag)], axis=1))[0]
+    return np.asarray(columns - past @ (past.T @ columns))
+
+
+def _two_weights(columns: Array) -> Array:
+    """(2,) least-squares weights of the first two ``columns`` (n, 3) for the third; 0 of a load that stands."""
+    normal = columns[:, :2].T @ columns
+    return np.linalg.solve(normal[:, :2] + 1e-9 * len(columns) * np.eye(2), normal[:, 2])
 
 
 def _share_moved_at_rest(view: View) -> float:
