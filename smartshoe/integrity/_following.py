@@ -9,21 +9,20 @@ explained by chance, but does not move along. A slow unit may answer changes of 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import product
 
 import numpy as np
 
-from smartshoe.arrays import Array, Index, Mask
+from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._answers import answered_s, binned, cut_short
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
+from smartshoe.integrity._plain_unit import delays_of, plain_units, squares_left, weights_of, without_past
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.signals.lags import lagged
 
-LAGS = 16  # resolution: lags that are tried, from a bin to the recording, and half as many delays
 RISES_WITH_LOAD = ("pressure", "force")
 
 
@@ -133,36 +132,16 @@ def _is_foretold(view: View) -> bool:
     load, reading = (
         binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
     )
-    load, halves = (load - load.min()) / np.ptp(load), (slice(0, middle), slice(middle, bins))
+    if np.ptp(load) == 0.0:
+        return False
     best = [(np.inf, np.inf, 0.0)] * 2  # of the unit told by either half: squares left there, in the other, and all
-    for lag_s, delay in product(np.geomspace(step_s, duration_s, LAGS), np.unique(np.r_[0, _delays(bins)])):
-        delayed = np.concatenate([np.full(delay, load[0]), load[: bins - delay]])
-        columns = np.stack([delayed, lagged(delayed, step_s, float(lag_s)), reading], axis=1)
-        first, second = (_without_past(columns[half], lag_s / step_s) for half in halves)
+    for lag, columns in plain_units(load, reading, delays_of(bins)):
+        first, second = (without_past(columns[half], lag) for half in (slice(0, middle), slice(middle, bins)))
         for place, (one, other) in enumerate(((first, second), (second, first))):
-            weights = _two_weights(one)
-            left, left_in_other = (float(np.sum((half[:, 2] - half[:, :2] @ weights) ** 2)) for half in (one, other))
-            if left < best[place][0]:
-                best[place] = left, left_in_other, float(np.sum(other[:, 2] ** 2))
+            weights = weights_of(one)
+            if (left := squares_left(one, weights)) < best[place][0]:
+                best[place] = left, squares_left(other, weights), float(np.sum(other[:, 2] ** 2))
     return given.clear * sum(one[1] for one in best) < sum(one[2] for one in best)
-
-
-def _delays(bins: int) -> Index:
-    """(k,) delays to try, in bins, up to an eighth of a recording."""
-    return np.rint(np.geomspace(1, max(bins // 8, 1), LAGS // 2)).astype(np.intp)
-
-
-def _without_past(columns: Array, lag: float) -> Array:
-    """(n, k) ``columns`` less what an offset, a drift and a past that fades with a ``lag``, in samples, explain."""
-    at = np.arange(len(columns))
-    past = np.linalg.qr(np.stack([np.ones(at.size), at, np.exp(-at / lag)], axis=1))[0]
-    return np.asarray(columns - past @ (past.T @ columns))
-
-
-def _two_weights(columns: Array) -> Array:
-    """(2,) least-squares weights of the first two ``columns`` (n, 3) for the third; 0 of a load that stands."""
-    normal = columns[:, :2].T @ columns
-    return np.linalg.solve(normal[:, :2] + 1e-9 * len(columns) * np.eye(2), normal[:, 2])
 
 
 def _share_moved_at_rest(view: View) -> float:
