@@ -77,3 +77,41 @@ def test_a_refusal_names_no_time_that_its_recording_does_not_hold() -> None:
     other = solid(levels(9, count, longest), lag, delay, 0.0, 1)
     (says,) = examine([logged(levels(1, count, longest), other, step_s)]).refusals
     assert "answer within 30 s" not in says
+
+
+RAIL_MBAR = 7.0
+
+
+def filled(seed: int, rail_mbar: float) -> Recording:
+    """A slow vessel under short pulses of several heights; what it reads, a little late, ends at ``rail_mbar``."""
+    rng, load = np.random.default_rng(seed), np.full(420, 8.0)
+    for at in range(20, 390, 40):
+        load[at : at + int(rng.integers(5, 9))] = rng.uniform(25.0, 60.0)
+    reading = np.round(solid(load, 9.0, 2, 0.0, seed, 0.02), 3)
+    return logged(load, np.minimum(reading, rail_mbar), 15.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4, 5, 7, 8])
+def test_a_rail_to_which_a_slow_unit_comes_after_pulses_of_several_heights_is_told(seed: int) -> None:
+    """It comes there as its load falls, so that no load shows how far the reading would have gone."""
+    cut = filled(seed, RAIL_MBAR)
+    found = examine([cut])
+    (rail,) = [fault for fault in found.faults if fault.kind == "saturation"]
+    assert "are exactly 7 mbar" in rail.says
+    assert not found.usable[0][cut.sensor.values == RAIL_MBAR].any()
+    assert "saturation" not in kinds(filled(seed, 99.0))
+
+
+@pytest.mark.parametrize("step_mbar", [0.001, 0.05, 0.4])
+@pytest.mark.parametrize("seed", range(4))
+def test_holds_and_peaks_on_a_grid_are_no_rail(seed: int, step_mbar: float) -> None:
+    """Of a unit without noise: even holds and smooth peaks, and friction that keeps a reading as its load falls."""
+    rng = np.random.default_rng(seed)
+    corners = np.cumsum(np.r_[0.0, rng.uniform(8.0, 30.0, 40)])
+    heights = np.tile([0.0, 30.0, 30.0, 0.0, 40.0, 37.0, 20.0, 40.0], 6)[: corners.size]
+    load = np.interp(np.arange(corners[-1]), corners, heights)
+    for lag in (0.1, 8.0):
+        rubbed = np.maximum(solid(load, lag, 0, 0.3, seed, 0.0), np.roll(solid(load, lag, 0, 0.3, seed, 0.0), 1))
+        for reading in (solid(load, lag, 0, 0.3, seed, 0.0), rubbed):
+            coarse = step_mbar * np.round(reading / step_mbar)
+            assert "saturation" not in kinds(logged(load, coarse, 0.5))
