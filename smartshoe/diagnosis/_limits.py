@@ -366,15 +366,22 @@ def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
 
 
 def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
-    """The sentence on a law that follows most of what the baseline misses and is not named."""
+    """The sentence on a law that follows most of what the baseline misses and is not named.
+
+    Small imperfections of many kinds may do so as well, but add up to no more than is ``tolerable``.
+    """
     if found.nearest_law is None:
         return []
     effect, left, beside = found.nearest_law
-    return [
+    said = (
         f"{in_words(effect.name)} alone follows most of what the baseline misses ({percent(left)} of full scale"
-        f" where it was fitted, {percent(beside)} with it), but so may small imperfections of many kinds,"
-        f" {percent(thresholds.imperfection)} each, so that it is not named: if this unit is better than that, set"
-        f" `material` to less than {percent(thresholds.material)}"
+        f" where it was fitted, {percent(beside)} with it)"
+    )
+    if left > thresholds.clear * thresholds.tolerable:
+        return [f"{said}, but too little in this data speaks for it against no effect at all, so that it is not named"]
+    return [
+        f"{said}, but so may small imperfections of many kinds, {percent(thresholds.imperfection)} each, so that it is"
+        f" not named: if this unit is better than that, set `material` to less than {percent(thresholds.material)}"
     ]
 
 

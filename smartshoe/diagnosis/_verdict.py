@@ -155,7 +155,7 @@ def sentence_of(
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
     elif best.rmse == baseline.rmse:  # the causes are nothing that the baseline gets wrong
-        said = f"{good}, with each recording's own zero allowed for; found in these zeros: {named}"
+        said = f"{good}, with each recording's own zero and clock allowed for; found in these: {named}"
     elif worse or best.rmse > baseline.rmse:
         how = "worse" if worse else "no better"
         said = f"{good}; with {named} it is {how} there, good to {by_all}, and it stays as it is"

@@ -2,7 +2,8 @@
 
 A reading follows where two things hold. The load explains enough of its variance, through a curve and first-order lags.
 And the increments of both go together, over at least one time constant that a law may have: a random walk may be
-explained by chance, but does not move along. A slow unit may answer changes of the load late instead (`_answers_soon`).
+explained by chance, but does not move along. A slow unit may answer changes of the load late instead
+(`_answers_soon`), or be foretold in either half of its recording by what the other half tells (`_is_foretold`).
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._answers import answered_s, binned, cut_short
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
+from smartshoe.integrity._plain_unit import delays_of, plain_units, squares_left, weights_of, without_past
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.signals.lags import lagged
 
 RISES_WITH_LOAD = ("pressure", "force")
@@ -40,7 +43,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
             explained >= follows and correlation > 0.0
         ):
             return  # few samples a ramp make a load look like noise, but noise is not followed so closely
-        if explained >= follows and _answers_soon(view):
+        if explained >= follows and (_answers_soon(view) or _is_foretold(view)):
             return
         if (froze := frozen(view)) is not None:
             yield froze
@@ -54,8 +57,9 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         if explained >= follows:
             says = (
                 f"the reading does not move with the load, though what is slow in it explains {100 * explained:.0f} %"
-                f" of its variance: were both recorded by one clock, is this the unit that was pressed, and does it"
-                f" answer within {max(memory_s):g} s (of a slower one record several steps of the load)?"
+                " of its variance, and what one half of the recording tells does not foretell the other: were both"
+                " recorded by one clock, and is this the unit that was pressed (of a slow one record several steps of"
+                " the load)?"
             )
         if view.thresholds.clear * (moved_at_rest := _share_moved_at_rest(view)) > 1.0:
             says = (
@@ -111,6 +115,33 @@ def _answers_soon(view: View) -> bool:
         if late_s is not None and 0.0 <= late_s <= max(time_constant_s, width_s):
             return True
     return False
+
+
+@on_one_thread
+def _is_foretold(view: View) -> bool:
+    """Whether a slow unit, as either half of the recording tells it, foretells most of the other half's reading.
+
+    The unit is the plain one: the load, after some delay, and the same behind one lag, of whatever time the recording
+    holds. Each half has an offset, a drift and a past of its own. A random course is often explained by chance, but
+    what explains one half of it does not foretell the other: less than half of the squares (`clear`) must be left.
+    """
+    given, duration_s = view.thresholds, float(view.time_s[-1] - view.time_s[0])
+    bins = min(given.bins, view.time_s.size)
+    step_s, middle = duration_s / bins, bins // 2
+    grid = view.time_s[0] + (np.arange(bins) + 0.5) * step_s
+    load, reading = (
+        binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
+    )
+    if np.ptp(load) == 0.0:
+        return False
+    best = [(np.inf, np.inf, 0.0)] * 2  # of the unit told by either half: squares left there, in the other, and all
+    for lag, columns in plain_units(load, reading, delays_of(bins)):
+        first, second = (without_past(columns[half], lag) for half in (slice(0, middle), slice(middle, bins)))
+        for place, (one, other) in enumerate(((first, second), (second, first))):
+            weights = weights_of(one)
+            if (left := squares_left(one, weights)) < best[place][0]:
+                best[place] = left, squares_left(other, weights), float(np.sum(other[:, 2] ** 2))
+    return given.clear * sum(one[1] for one in best) < sum(one[2] for one in best)
 
 
 def _share_moved_at_rest(view: View) -> float:

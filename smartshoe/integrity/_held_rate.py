@@ -1,4 +1,9 @@
-"""A channel that is logged more slowly than its table, each of its values held until the next one comes."""
+"""A channel that is logged more slowly than its table, each of its values held until the next one comes.
+
+A load that was set step by step, as by a converter, stands between its steps as well, and is known at all samples. The
+reading tells which of the two it was: under a load that was read slowly it goes on between the moments at which it was
+read, towards a value that is logged only later.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +13,12 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index
 from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._plain_unit import delays_of, plain_units, squares_left, weights_of, without_past
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
+
+PER_HOLD = 8  # resolution: samples of each value that are looked at
 
 
 def without_held(recordings: Sequence[Recording], thresholds: Thresholds) -> list[tuple[Recording, list[Finding]]]:
@@ -21,6 +30,7 @@ def without_held(recordings: Sequence[Recording], thresholds: Thresholds) -> lis
     """
     each = [_held_for(recording, thresholds) for recording in recordings]
     certain = {(name, count) for own in each for name, (count, is_certain) in own.items() if is_certain}
+    certain = {(name, count) for name, count in certain if not _is_staircase(name, count, recordings, thresholds)}
     thinned = []
     for recording, own in zip(recordings, each, strict=True):
         held = {name: count for name, (count, _) in own.items() if (name, count) in certain}
@@ -47,6 +57,49 @@ def _held_for(recording: Recording, thresholds: Thresholds) -> dict[str, tuple[i
         if usual > 1 and np.mean(held_for % usual == 0) > 1.0 - thresholds.faulty_share:
             found[channel.name] = usual, bool(large > thresholds.clear * small)
     return found
+
+
+@on_one_thread
+def _is_staircase(name: str, count: int, recordings: Sequence[Recording], thresholds: Thresholds) -> bool:
+    """Whether the load ``name``, which stands for ``count`` samples at a time, stood so, and readings followed that.
+
+    Plain units must leave clearly fewer squares under it than under a load that goes in lines from each moment at which
+    a value came to the next. They are compared by their increments over half of the time that a value stands, since the
+    two loads differ in what happens within it.
+    """
+    stood, went_on = 0.0, 0.0
+    for recording in recordings:
+        if [one.name for one in recording.of_role("load")] != [name] or len(recording.sensors) != 1:
+            continue
+        load, reading = recording.load.values, recording.sensor.values
+        came_at = np.flatnonzero(np.diff(load)) + 1
+        if came_at.size < thresholds.few**2:
+            continue
+        taken = slice(int(came_at[0]), int(came_at[-1]) + 1, max(count // PER_HOLD, 1))
+        lines = np.interp(np.arange(load.size), *_corners_of(load, count))
+        half = max(count // taken.step // 2, 1)
+        stood, went_on = (
+            total + _squares_of_increments(one[taken][: thresholds.bins], reading[taken][: thresholds.bins], half)
+            for total, one in ((stood, load), (went_on, lines))
+        )
+    return thresholds.clear * stood < went_on
+
+
+def _corners_of(load: Array, count: int) -> tuple[Index, Array]:
+    """(m,) samples at which a ``load`` (n,) was read if that was every ``count`` samples, and (m,) its values there."""
+    at = _read_at(load, count)
+    return at, load[at]
+
+
+def _squares_of_increments(load: Array, reading: Array, span: int) -> float:
+    """What the best plain unit leaves of the squares of a ``reading``'s (n,) increments over ``span`` samples."""
+    delays = {*range(0, 4 * span + 1, max(span // 2, 1)), *delays_of(load.size).tolist()}
+    best = np.inf
+    for lag, columns in plain_units(load, reading, sorted(delays)):
+        increments = without_past(columns, lag)
+        increments = increments[span:] - increments[:-span]
+        best = min(best, squares_left(increments, weights_of(increments)))
+    return best
 
 
 def _taken(recording: Recording, slowest: str, count: int) -> tuple[Recording, list[Finding]]:

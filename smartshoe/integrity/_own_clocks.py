@@ -70,6 +70,9 @@ def clocks_of(
         offsets_s[place] = lag.before_s
     for place in (place for place in there if place >= count):
         middle_s = np.array(0.5 * recordings[place].duration_s)
+        if fitted.is_of_unit(alone[place].lags, thresholds):
+            offsets_s[place] = rates[place] = 0.0
+            continue
         is_other, clock = _judged_clock(alone[place], compared.get(place), fitted, middle_s, thresholds)
         if is_other:
             others.add(place)
@@ -94,6 +97,13 @@ class _FittedClocks:
     clock: OneClock | None
     compared: list[Increments]
     possible: OneClock | None = None
+
+    def is_of_unit(self, lags: Lags, thresholds: Thresholds) -> bool:
+        """Whether ``lags`` of another recording are those of the unit, which is late in the fitted ones as well.
+
+        There the lag is accounted for by one delay and is told to be no clock's.
+        """
+        return self.clock is None and self.shared is not None and lags.are_of(self.shared, thresholds)
 
 
 def _fitted_clocks(

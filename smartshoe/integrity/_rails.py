@@ -1,8 +1,9 @@
 """Rails: many readings are exactly equal at the loaded end (saturation), or at the unloaded end while the load is on.
 
 Readings that are tied at an end may also be a peak that stands on one level of the grid, or held samples. They are a
-rail where the load goes on beyond it by more than a grid hides, or where noise stands still only there; or where
-another recording of the unit showed that its sensor ends at that value.
+rail where the load goes on beyond it by more than a grid hides, or where noise stands still only there; where they are
+tied under loads that are read differently elsewhere; or where another recording of the unit showed that its sensor ends
+at that value.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
         return
     least = _least_hidden_span(view, tied)
     hidden = _hidden_span(view, tied, top, -1.0)
-    stands = _noise_stands_still(view, tied, top, -1.0)
+    stands = _noise_stands_still(view, tied, top, -1.0) or _ends_alike_under_unlike_loads(view, tied, least)
     if hidden <= least and not stands and not _is_known(view, top):
         return
     cut = f", and about {percent(hidden / view.span)} of the span is cut off" if hidden > least else ""
@@ -149,6 +150,28 @@ def _noise_stands_still(view: View, tied: Mask, rail: float, inward: float) -> b
     if min(is_beside.sum(), is_upper.sum()) < given.local // 4:
         return False
     return bool(given.clear * np.median(noise[is_beside]) > np.median(noise[is_upper]))
+
+
+def _ends_alike_under_unlike_loads(view: View, tied: Mask, least: float) -> bool:
+    """Whether runs of ``tied`` readings that are no peaks come under loads that are read farther apart than ``least``.
+
+    That is by the mean gain, since a slow unit may come to its rail as its load falls and is nowhere near its curve. A
+    load that stands, or friction, holds a reading as well, but under another load at another value. Nor is such a run
+    the top of a smooth peak: of one that stays within a step of the grid for a while, what lies beside it, as long
+    again, is no more than eight steps lower (a parabola's).
+    """
+    reading, given = view.reading, view.thresholds
+    y, lowest = reading.values, given.clear * 8.0 * float(reading.local_step[tied][0])
+    lowest += reading.largest * reading.quiet_noise
+    highest_n = []
+    for first, stop in zip(*runs_of(tied), strict=True):
+        size = stop - first
+        if given.few <= size <= min(first, y.size - stop):
+            beside = max(float(y[first - size : first].min()), float(y[stop : stop + size].min()))
+            if y[first] - beside > lowest:
+                highest_n.append(float(view.load.values[first:stop].max()))
+    gain = float(np.polyfit(view.load.values, y, 1)[0])
+    return bool(highest_n) and gain * float(np.ptp(highest_n)) > least
 
 
 def _hidden_span(view: View, tied: Mask, rail: float, inward: float) -> float:

@@ -103,6 +103,15 @@ def isolated_beside(view: View, bad: Mask) -> Mask:
     return found
 
 
+def _has_neighbours(bad: Mask, few: int) -> Mask:
+    """(m,) whether the good samples next to each lie within ``few`` samples: what comes back later was no spike."""
+    good = np.flatnonzero(~bad)
+    apart = np.diff(good, prepend=good[:1], append=good[-1:])
+    beside = np.zeros(bad.size, dtype=bool)
+    beside[good] = np.maximum(apart[:-1], apart[1:]) <= few
+    return beside
+
+
 def spikes(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``spikes``; masked. One finding for the reading, one for the reference load.
 
@@ -110,19 +119,22 @@ def spikes(view: View, bad: Mask) -> Iterator[Finding]:
     """
     if view.span == 0.0 or view.gain == 0.0:
         return
-    found = isolated_beside(view, bad)
+    alone = isolated_beside(view, bad)
+    found = alone & _has_neighbours(bad, view.thresholds.few)
     if found.any():
-        usual_size = float(np.median(np.abs(view.reading.outlying[found])))
-        lasting_count = int((view.thresholds.clear * lasting_jumps(view, found | bad) > usual_size).sum())
+        off = np.zeros(bad.size)
+        off[~bad] = Signal(view.reading.values[~bad], view.thresholds).outlying
+        usual_size = float(np.median(np.abs(off[found])))
+        lasting_count = int((view.thresholds.clear * lasting_jumps(view, alone | bad) > usual_size).sum())
         if lasting_count <= runs_of(found)[0].size:
-            yield _finding(view, found, view.reading, view.span, "reading")
+            yield _finding(view, found, off, view.span, "reading")
     load_gain = view.load_span / view.span
     on_load = isolated(view.load, view.reading_corner, view.thresholds.clear * load_gain, view.load_span, view.near)
     on_load &= ~_on_a_lasting_level(view.load)
     if on_load.any():
         # A sharp peak of the load may look like a spike of less than the span; one that exceeds the span is no load.
         beyond_span = on_load & (np.abs(view.load.outlying) > view.load_span)
-        found_on_load = _finding(view, on_load, view.load, view.load_span, "reference load")
+        found_on_load = _finding(view, on_load, view.load.outlying, view.load_span, "reference load")
         yield replace(found_on_load, no_load=view.whole(beyond_span | _stands_alone(view.load, on_load)))
 
 
@@ -150,9 +162,9 @@ def _stands_alone(signal: Signal, found: Mask) -> Mask:
     return is_alone
 
 
-def _finding(view: View, at: Mask, signal: Signal, span: float, what: str) -> Finding:
-    """The finding of spikes ``at`` (m,) of a ``signal`` with a ``span``; ``what`` is its name in the sentence."""
-    size = np.abs(signal.outlying[at])
+def _finding(view: View, at: Mask, off: Array, span: float, what: str) -> Finding:
+    """The finding of spikes ``at`` (m,), which are ``off`` (m,) from a signal of a ``span``; ``what`` is its name."""
+    size = np.abs(off[at])
     largest = f"{percent(float(size.max()) / span)} of its span"
     said = f"an isolated spike of {largest}: it is left out"
     if size.size > 1:

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._causes import _fall_without_it, _held_out_evidence, _n
 from smartshoe.diagnosis._diagnose import _pulled_reason, _refused
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, own_terms_of
-from smartshoe.diagnosis._limits import limit_refusals
+from smartshoe.diagnosis._limits import limit_nearest_law, limit_refusals
 from smartshoe.diagnosis._naming import confidence_of
 from smartshoe.diagnosis._procedure import (
     _goodness,
@@ -30,6 +30,7 @@ from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import prepare
 from smartshoe.diagnosis._verdict import names_in, sentence_of, unexplained_remark, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets
+from smartshoe.display import percent
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.extended import ExtendedModel
@@ -545,3 +546,11 @@ def test_a_model_gives_readings_as_they_are_logged() -> None:
     first, second = _with_offset(drifting, (), [session], SCALE, MODEL).parts
     assert (first.name, second.values) == ("zero_drift", pytest.approx(part))
     assert _with_offset(drifting, (), [session], SCALE).parts[1].values != pytest.approx(part)
+
+
+@pytest.mark.parametrize(("left", "is_small"), [(0.002, True), (0.0029, True), (0.0031, False), (0.08, False)])
+def test_small_imperfections_are_said_to_follow_no_more_than_they_add_up_to(left: float, is_small: bool) -> None:
+    found: Any = SimpleNamespace(nearest_law=(effect("delay"), left, 0.3 * left))
+    (said,) = limit_nearest_law(found, Thresholds())
+    assert said.startswith(f"delay alone follows most of what the baseline misses ({percent(left)} of full scale")
+    assert ("small imperfections" in said, "set `material`" in said) == (is_small, is_small)

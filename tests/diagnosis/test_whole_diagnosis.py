@@ -419,5 +419,5 @@ def test_what_the_baseline_leaves_open_is_not_said_to_be_mended() -> None:
     both = Errors(np.array([1e-4]), np.array([1.0]), 1.0)
     assert sentence_of("explained", names_in(causes, 0), both, both, None, Thresholds()) == (
         "the baseline simulation is good to 1 % of full scale on data it was not fitted to, with each"
-        " recording's own zero allowed for; found in these zeros: zero offset"
+        " recording's own zero and clock allowed for; found in these: zero offset"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -12,6 +12,7 @@ from smartshoe import Recording, diagnose
 from smartshoe.integrity import examine
 from smartshoe.integrity._held_rate import without_held
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.signals.lags import lagged
 
 Array = NDArray[np.float64]
 STANDARD = Thresholds()
@@ -86,3 +87,50 @@ def test_a_plain_unit_whose_load_is_held_has_no_delay() -> None:
     found = diagnose(runs)
     assert (found.verdict, found.causes) == ("adequate", ())
     assert sum(fault.kind == "held_samples" for fault in found.data_faults) == 2
+
+
+def _stairs(count: int, seed: int, samples: int = 1500) -> Array:
+    """A load that a converter sets anew every ``count`` samples, to anything."""
+    drawn = np.random.default_rng(seed).uniform(20.0, 400.0, samples // count + 1)
+    return np.repeat(drawn, count)[:samples]
+
+
+def _behind(load_n: Array, lag: float, delay: int, seed: int) -> Array:
+    """What lags behind a load, and comes after a delay (samples), with noise of 0.1 % of its span."""
+    late = np.concatenate([np.full(delay, load_n[0]), load_n[: load_n.size - delay]])
+    return 0.2 * lagged(late, 1.0, lag) + 0.08 * np.random.default_rng(seed).standard_normal(load_n.size)
+
+
+@pytest.mark.parametrize("count", [5, 12, 40])
+@pytest.mark.parametrize(("lag", "delay"), [(0.1, 0), (3.0, 2), (12.0, 1)])
+@settings(max_examples=6)
+@given(seed=st.integers(0, 2**16))
+def test_a_load_that_was_set_step_by_step_is_known_between_its_steps(
+    count: int, lag: float, delay: int, seed: int
+) -> None:
+    load_n = _stairs(count, seed)
+    given_ = _recording(load_n, _behind(load_n, lag, delay, seed))
+    assert without_held([given_], STANDARD) == [(given_, [])]
+
+
+@pytest.mark.parametrize("count", [5, 12, 40])
+@pytest.mark.parametrize(("lag", "delay"), [(0.1, 0), (3.0, 2), (12.0, 1)])
+@settings(max_examples=6)
+@given(seed=st.integers(0, 2**16))
+def test_a_load_that_went_on_while_its_value_stood_is_used_where_it_was_read(
+    count: int, lag: float, delay: int, seed: int
+) -> None:
+    """The same values, between which the load went in lines."""
+    at = np.arange(0, 1500, count)
+    load_n = np.interp(np.arange(1500), at, _stairs(count, seed)[at])
+    given_ = _recording(_held(load_n, count), _behind(load_n, lag, delay, seed))
+    ((taken, findings),) = without_held([given_], STANDARD)
+    assert [one.kind for one in findings] == ["held_samples"]
+    assert len(taken) == pytest.approx(1500 / count, abs=2)
+
+
+def test_a_short_recording_of_a_staircase_is_not_refused() -> None:
+    load_n = _stairs(9, 4, 400)
+    found = examine([_recording(load_n, _behind(load_n, 4.0, 2, 4))])
+    assert (found.faults, found.refusals) == ((), ())
+    assert len(found.recordings[0]) == 400

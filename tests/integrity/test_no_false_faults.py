@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from test_integrity_faults import kinds, on_lattice, recorded, with_reading
 
 from smartshoe.integrity import examine
-from smartshoe.integrity._spikes import comes_back
+from smartshoe.integrity._examination import _view
+from smartshoe.integrity._spikes import comes_back, spikes
+from smartshoe.integrity._view import UNKNOWN_ENDS
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.protocol import dynamic_protocol, static_protocol
 from smartshoe.recording import Recording
@@ -152,3 +154,19 @@ def test_only_what_comes_back_is_a_spike(seed, size, length):
     stepped[30:] += size
     assert comes_back(spiked, found, Thresholds())[found].all()
     assert not comes_back(stepped, found, Thresholds()).any()
+
+
+def test_a_move_before_a_stretch_that_is_held_is_no_spike():
+    """What stands between a measured level and the next, far later, is not seen to come back."""
+    time_s = 0.03 * np.arange(800)
+    load = 30.0 + 25.0 * np.sin(0.9 * time_s)
+    reading = 0.2 * load + 0.02 * np.random.default_rng(3).standard_normal(load.size)
+    bad = np.zeros(load.size, dtype=bool)
+    reading[300:314], bad[301:314] = reading[300] + 4.0, True
+    moved = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=reading)
+    assert list(spikes(_view(moved, Thresholds(), UNKNOWN_ENDS), bad)) == []
+    reading[445] += 4.0
+    spiked = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=reading)
+    (found,) = spikes(_view(spiked, Thresholds(), UNKNOWN_ENDS), bad)
+    assert np.flatnonzero(found.at).tolist() == [445]
+    assert "an isolated spike of 39 %" in found.says

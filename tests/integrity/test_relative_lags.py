@@ -20,6 +20,7 @@ from smartshoe.integrity._examination import _view
 from smartshoe.integrity._own_clocks import Alone, Clocks, clocks_of
 from smartshoe.integrity._relative_lags import NO_LAG, increments_of, own_clock, own_lags_s, refined_clock
 from smartshoe.integrity._view import UNKNOWN_ENDS
+from smartshoe.signals.lags import lagged
 
 Array = NDArray[np.float64]
 
@@ -402,3 +403,30 @@ def test_numbers_whose_squares_are_none_are_refused(size: float) -> None:
     run = _run(0.0, 1)
     (said,) = examine([run.with_channel(run.sensor.with_values(size * run.sensor.values))], STANDARD).refusals
     assert "which are no measurements: give another unit" in said
+
+
+def _late_unit(seed: int, name: str) -> Recording:
+    """A random load of 150 s, and what follows it four samples late, lags, and wanders."""
+    rng = np.random.default_rng(seed)
+    drawn = lfilter([1.0], [1.0, -np.exp(-1.0 / 8.0)], rng.standard_normal(420))[200:]
+    drawn = lfilter([0.5], [1.0, -0.5], drawn)
+    load_n = 30.0 + 10.0 * drawn / np.std(drawn)
+    late = np.concatenate([np.full(4, load_n[0]), load_n[:-4]])
+    wander = 0.12 * np.cumsum(rng.standard_normal(late.size)) + 0.05 * rng.standard_normal(late.size)
+    time_s = 0.7 * np.arange(load_n.size)
+    return Recording.from_arrays(
+        time_s=time_s, force_n=load_n, pressure_mbar=0.4 * lagged(late, 1.0, 3.0) + wander, name=name
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 6, 23, 54, 55])
+def test_a_lag_that_only_one_that_judges_tells_is_the_units_where_the_fitted_one_has_it_too(seed: int) -> None:
+    """The edges of the fitted one show that lag as well, though not for certain: one logger made both."""
+    fitted, judging = _late_unit(2 * seed, "fitted"), _late_unit(2 * seed + 1, "judging")
+    assert examine([judging]).clock_offset_s[0] == pytest.approx(4.0, abs=0.4)
+    found = examine([fitted, judging], count=1)
+    assert (found.clock_offset_s, found.clock_rate, found.others) == ((0.0, 0.0), (0.0, 0.0), frozenset())
+    assert [fault.kind for fault in found.faults] == []
+    # One that is late by another two seconds is told to be.
+    later = _late(judging, 2.1)
+    assert examine([fitted, later], count=1).clock_offset_s[1] > 1.0
