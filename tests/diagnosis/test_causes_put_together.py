@@ -41,7 +41,12 @@ def test_names_know_whether_loads_go_with_the_clock_and_zeros_change(parts: Any)
         parts.given.excitation.goes_with_the_clock = there
         parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if there else ()
         run_diagnosis(parts)
-        assert parts.seen["names_of"][1] == {"is_clocked": there, "is_unsteady": there, "best_single": None}
+        assert parts.seen["names_of"][1] == {
+            "is_clocked": there,
+            "is_unsteady": there,
+            "best_single": None,
+            "together": [],
+        }
 
 
 def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
-from smartshoe.diagnosis._causes import _fall_without_it, _held_out_evidence, _nearest_rival, cause_of, zero_cause_of
+from smartshoe.diagnosis._causes import (
+    _beside_kin,
+    _fall_without_it,
+    _held_out_evidence,
+    _nearest_rival,
+    cause_of,
+    zero_cause_of,
+)
 from smartshoe.diagnosis._diagnose import _pulled_reason, _refused
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, own_terms_of
@@ -286,6 +293,7 @@ def _told(
     monkeypatch.setattr(_causes, "errors", after)
     monkeypatch.setattr(_causes, "parameters_of", lambda fit, name, scale: {"of": (fit, name, scale)})
     member = SimpleNamespace(
+        kin=(),
         name="static_curve_block",
         size=0.0123,
         without=SimpleNamespace(model=SimpleNamespace(held_as=lambda whole: f"without, held as {whole}")),
@@ -321,6 +329,14 @@ def _told(
     assert (cause.equivalents, cause.size) == (equivalents, 0.0123)
     assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
     return cause
+
+
+@pytest.mark.parametrize(("kin", "said"), [((), ""), (("clock_drift", "sensor_lag"), "clock drift, sensor lag")])
+def test_what_stands_beside_a_cause_and_is_of_its_kind_is_said(kin: tuple[str, ...], said: str) -> None:
+    name: Any = SimpleNamespace(member=SimpleNamespace(kin=kin))
+    told = _beside_kin(name)
+    assert [one.value for one in told] == ([float(len(kin))] if kin else [])
+    assert all(one.says.startswith(f"the extended model has {said} beside it, of one kind with it") for one in told)
 
 
 def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -479,9 +479,9 @@ def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_th
     bent = MODEL.with_part("dead_band", np.array([0.2, 0.3, 0.0]))
     assert own_zeros(sessions, bent, STANDARD) is None  # where as much is left it may be the model's error
     (said,) = limit_own_zeros(zeros, scale)
-    assert "% of full scale) in triangles_1 to " in said
     read = scale.zero + float(zeros.offsets[0]) * scale.reading  # as it is logged
-    assert f"from {read:.3g} {scale.unit.symbol} (" in said
+    assert f"from {read:.4g} {scale.unit.symbol} in triangles_1 to " in said
+    assert f"in triangles_2, {100.0 * float(np.ptp(zeros.offsets)):.2g} % of full scale apart: " in said
     assert own_zeros(sessions, replace(MODEL, relaxing_share=9.0), STANDARD) is None  # no wall has such an arm
     on = replace(sessions[1], recording=replace(moved, metadata={"continues": "triangles_1"}))
     assert own_zeros([sessions[0], on], MODEL, STANDARD) is None
