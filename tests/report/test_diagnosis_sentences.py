@@ -181,6 +181,7 @@ def test_what_effects_without_a_name_follow_is_not_called_explained() -> None:
         "8 % of the error's variance is noise; of the rest 98 % is followed by effects that have no name."
     )
     assert shares_text(replace(made, causes=(LEAK_CAUSE,))).endswith("98 % is explained.")
+    assert shares_text(replace(made, explained_percent=0.3)).endswith("of the rest none is explained.")
 
 
 def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> None:

@@ -419,15 +419,18 @@ def shares_text(diagnosis: Diagnosis) -> str:
     """The shares of the error's variance in a sentence."""
     part = shares(diagnosis)
     if part is None:
-        said = percent_of_whole(diagnosis.explained_percent) if diagnosis.explained_percent >= 0.5 else "none"
-        return f"Of the error's variance {said} is {followed(diagnosis)}; how much of the rest is noise cannot be told."
+        said = _share_explained(diagnosis, diagnosis.explained_percent)
+        return f"Of the error's variance {said}; how much of the rest is noise cannot be told."
     explainable = part.explained + part.left
     if explainable < 0.5:
         return "Nearly all of the error's variance is noise, which no model explains."
     noise = "under 1 %" if part.noise < 1.0 else f"{part.noise:.0f} %"
-    explained = 100.0 * part.explained / explainable
-    of_it = percent_of_whole(explained) if explained >= 0.5 else "none"
-    return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it} is {followed(diagnosis)}."
+    of_it = _share_explained(diagnosis, 100.0 * part.explained / explainable)
+    return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it}."
+
+
+def _share_explained(diagnosis: Diagnosis, percent: float) -> str:
+    return f"{percent_of_whole(percent)} is {followed(diagnosis)}" if percent >= 0.5 else "none is explained"
 
 
 def what_is_left(diagnosis: Diagnosis) -> str:
