@@ -21,6 +21,7 @@ from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
+from smartshoe.signals.masks import runs_of
 
 NEWTON_STEPS = 4  # a lag within what the smoothing spans is found in two
 NO_LAG = OneClock(0.0, 0.0)
@@ -44,6 +45,12 @@ class Increments:
     def normal_equations(self) -> Array:
         """(k, k + 1) inner products of the regressors with one another, and in the last column with the response."""
         return np.asarray(self.regressors.T @ np.column_stack([self.regressors, self.response]))
+
+    def edges(self, thresholds: Thresholds) -> int:
+        """The number of times that the load rises, or falls if that is less often."""
+        moves = self.regressors[:, 0]
+        least = thresholds.standing * float(np.abs(moves).max())
+        return min(runs_of(way * moves > least)[0].size for way in (1.0, -1.0))
 
     def without_lag(self, clock: OneClock | None) -> Increments:
         """The same with its reading earlier by the lag of ``clock``; itself if that is None."""
@@ -278,8 +285,11 @@ def _relative_clock(
     """The clock, a lag or (two ``parts``) a line near another, by which a reading follows what is ``predicted`` (b,).
 
     None unless it leaves fewer squares than the ``known`` clock (else none) by the factor ``clear``, at rising and at
-    falling edges alike: load that the unit remembers has another lag for each direction.
+    falling edges alike: load that the unit remembers has another lag for each direction. A line is told by no fewer
+    than ``few`` edges of each: it goes through any two.
     """
+    if parts > 1 and one.edges(thresholds) < thresholds.few:
+        return None
     rises = (one.regressors[:, 0] > 0.0).astype(float)
     found = near
     for _ in range(NEWTON_STEPS):

@@ -430,3 +430,33 @@ def test_a_lag_that_only_one_that_judges_tells_is_the_units_where_the_fitted_one
     # One that is late by another two seconds is told to be.
     later = _late(judging, 2.1)
     assert examine([fitted, later], count=1).clock_offset_s[1] > 1.0
+
+
+def _stiffened(corners: list[tuple[float, float]], name: str) -> Recording:
+    """A unit that reads a few percent more while its load is fast (asinh of the rate), by one clock."""
+    time_s = np.arange(0.0, corners[-1][0], STEP_S)
+    load = np.interp(time_s, *zip(*corners, strict=True))
+    felt = load * (1.0 + 0.02 * np.arcsinh(np.abs(np.gradient(load, STEP_S)) / 0.05) / np.arcsinh(20.0))
+    keep = np.exp(-STEP_S / 2.0)
+    read = 0.8 * felt + 0.2 * (lfilter([1.0 - keep], [1.0, -keep], felt - felt[0]) + felt[0])
+    read += 5e-4 * np.random.default_rng(len(name)).standard_normal(load.size)
+    return Recording.from_arrays(time_s=time_s, force_n=30.0 * load, pressure_v=0.5 + 3.2 * read, name=name)
+
+
+def _stairs(start: float, levels: tuple[float, ...]) -> list[tuple[float, float]]:
+    corners, at_s = [(0.0, start), (3.0, start)], 3.0
+    for level in (*levels, start):
+        corners += [(at_s + 0.5, level), (at_s + 10.5, level)]
+        at_s += 10.5
+    return corners
+
+
+@pytest.mark.parametrize("start", [0.4, 0.5])
+def test_two_edges_tell_no_line_of_lags(start: float) -> None:
+    """A line goes through any two, and a short staircase has no more each way: it was moved by 4 ms a second."""
+    waves = [(0.0, 0.3), *((3.0 + 3.0 * k, 0.9 if k % 2 else 0.3) for k in range(16))]
+    fitted = [_stiffened(_stairs(0.5, (0.8, 0.4, 1.0, 0.3, 0.6)), "stairs"), _stiffened(waves, "waves")]
+    short = _stiffened(_stairs(start, (0.9, 0.5)), "short")
+    found = examine([*fitted, short], STANDARD, 2)
+    assert found.clock_rate[2] == 0.0
+    assert not [one for one in found.faults if one.kind == "two_clocks"]
