@@ -129,12 +129,12 @@ def moment(time_s: float, digits: int = 6) -> str:
     return fixed.rstrip("0").rstrip(".") if "." in fixed else fixed
 
 
-def duration(time_s: float) -> str:
-    """A duration to three digits, in s below two minutes, in min below two hours, else in h."""
-    for limit_s, unit_s, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min")):
+def duration(time_s: float, seconds_below_s: float = 120.0, hour_digits: int = 3) -> str:
+    """A duration to three digits, in s below ``seconds_below_s``, in min below two hours, else in h."""
+    for limit_s, unit_s, name in ((seconds_below_s, 1.0, "s"), (7200.0, 60.0, "min")):
         if time_s < limit_s:
             return f"{time_s / unit_s:.3g} {name}"
-    return f"{time_s / 3600.0:.3g} h"
+    return f"{time_s / 3600.0:.{hour_digits}g} h"
 
 
 def panels(count: int, *, height: float = 2.6) -> tuple[Figure, list[Axes]]:

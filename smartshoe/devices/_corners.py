@@ -75,8 +75,7 @@ def follow_corners(machine_s: Array, load: Array, logger_s: Array, signal: Array
     load's noise hold a search wherever it begins.
     """
     aside = 0.5 * SLOPE_OVER_S
-    ends = [_searched_from(machine_s, load, logger_s, signal, delay_s + way * aside) for way in (-1.0, 1.0)]
-    first, second = ends
+    first, second = (_searched_from(machine_s, load, logger_s, signal, delay_s + way * aside) for way in (-1.0, 1.0))
     if first is None or second is None:
         return None
     return first if abs(first.delay_s - second.delay_s) <= max(first.delay_sd_s, second.delay_sd_s) else None

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.devices._corners import follow_corners
+from smartshoe.devices._corners import AtCorners, follow_corners
 from smartshoe.devices.following import Following, follow
 from smartshoe.errors import InputError
 from smartshoe.kernels.blas import on_one_thread
@@ -146,23 +146,21 @@ def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array
     _require_match(correlation)
     found = follow(machine_s, load, logger_s, reading, delay)
     if found.misfit <= LARGEST_MISFIT:
-        sds = found.delay_sd_s, found.rate_sd
-        return Alignment(found.delay_s, sds[0], found.rate, sds[1], correlation, found.residual, "model")
+        return _aligned(found, correlation, found.residual, "model")
     if (at := follow_corners(machine_s, load, logger_s, reading, delay)) is not None:
-        return Alignment(at.delay_s, at.delay_sd_s, at.rate, at.rate_sd, correlation, found.residual, "corners")
-    return _by_curve(machine_s, load, logger_s, reading, delay, found, correlation)
+        return _aligned(at, correlation, found.residual, "corners")
+    bent = _bent(machine_s, load, logger_s, reading, delay, found)
+    return _aligned(bent, correlation, bent.residual, "curve")
 
 
-def _by_curve(
-    machine_s: Array,
-    load: Array,
-    logger_s: Array,
-    reading: Array,
-    delay_s: float,
-    straight: Following,
-    correlation: float,
-) -> Alignment:
-    """Delay and rate with a bent characteristic, with sds that count what the bend changes of each.
+def _aligned(found: Following | AtCorners, correlation: float, residual: Array, by: By) -> Alignment:
+    return Alignment(found.delay_s, found.delay_sd_s, found.rate, found.rate_sd, correlation, residual, by)
+
+
+def _bent(
+    machine_s: Array, load: Array, logger_s: Array, reading: Array, delay_s: float, straight: Following
+) -> Following:
+    """The fit with a bent characteristic, with sds that count what the bend changes of delay and rate.
 
     A smooth load tells a rate from what the unit remembers only poorly: one that is not clear of none is none.
     """
@@ -172,7 +170,7 @@ def _by_curve(
     if abs(bent.rate) < NORMAL_95 * rate_sd:
         straight, bent = (follow(*logs, powers, at_one_rate=True) for powers in (1, POWERS))
     delay_sd_s = max(bent.delay_sd_s, abs(bent.delay_s - straight.delay_s))
-    return Alignment(bent.delay_s, delay_sd_s, bent.rate, rate_sd, correlation, bent.residual, "curve")
+    return replace(bent, delay_sd_s=delay_sd_s, rate_sd=rate_sd)
 
 
 def join(machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger") -> Recording:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -200,16 +200,9 @@ def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[s
     own zero and past, and are of held-out loads, which may be less demanding.
     """
     model, there = found.model, [one for one in found.fine if one.usable.any()]
-    scale_n = model.full_scale_load_n
-    off_n = [
-        _rms([_error_without_own_n(one, model, _compensator(model, one), found.zero)], [one.usable]) for one in there
-    ]
-    worst = max(range(len(there)), key=off_n.__getitem__)
-    worst_n, name = off_n[worst], there[worst].recording.name
-    stated_n, least_n = (
-        _rms([_force_error_n(there[worst], model)], [there[worst].usable]),
-        thresholds.tolerable * scale_n,
-    )
+    off_n = (_error_without_own_n(one, model, _compensator(model, one), found.zero) for one in there)
+    name, worst_n, stated_n = _farthest_off(there, off_n, model)
+    least_n = thresholds.tolerable * model.full_scale_load_n
     if worst_n <= thresholds.clear * max(stated_n, least_n):
         held_n = found.error.held_out_n
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
@@ -232,19 +225,25 @@ def limit_unsound_readings(found: Compensation, scale: Scale, thresholds: Thresh
     The stated errors are of readings without them. A stream has them, and what they leave behind is in sound samples.
     """
     model, there = found.model, [one for one in found.fine if one.usable.any() and not one.usable.all()]
-    with_n = [_rms([_force_error_n(one, model, _as_logged(one, scale))], [one.usable]) for one in there]
     if not there:
         return []
-    worst = max(range(len(there)), key=with_n.__getitem__)
-    without_n = _rms([_force_error_n(there[worst], model)], [there[worst].usable])
-    if with_n[worst] <= thresholds.clear * max(without_n, thresholds.tolerable * model.full_scale_load_n):
+    off_n = (_force_error_n(one, model, _as_logged(one, scale)) for one in there)
+    name, with_n, without_n = _farthest_off(there, off_n, model)
+    if with_n <= thresholds.clear * max(without_n, thresholds.tolerable * model.full_scale_load_n):
         return []
     return [
         "a filter remembers samples that are no readings (they are left out here) as if they were loads: with them the"
-        f" force of {there[worst].recording.name} is off by {rounded(with_n[worst])} N (rms) in its sound samples,"
-        f" without by {rounded(without_n)} N (take them out before the filter: a median of three samples does for"
-        " single ones)"
+        f" force of {name} is off by {rounded(with_n)} N (rms) in its sound samples, without by {rounded(without_n)} N"
+        " (take them out before the filter: a median of three samples does for single ones)"
     ]
+
+
+def _farthest_off(there: Sequence[Session], off_n: Iterable[Array], model: ExtendedModel) -> tuple[str, float, float]:
+    """The recording of ``there`` with the largest errors ``off_n`` (n,), their rms in N, and that which is stated."""
+    rms_n = [_rms([error_n], [one.usable]) for one, error_n in zip(there, off_n, strict=True)]
+    worst = max(range(len(there)), key=rms_n.__getitem__)
+    stated_n = _rms([_force_error_n(there[worst], model)], [there[worst].usable])
+    return there[worst].recording.name, rms_n[worst], stated_n
 
 
 def _as_logged(session: Session, scale: Scale) -> Array:

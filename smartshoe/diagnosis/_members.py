@@ -93,12 +93,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
         fit(likelihood, _without(one.name, extended.model, is_at_end_of_kind=at_end), FEW_STEPS)
         for one, at_end in zip(chosen, ended, strict=True)
     ]
-    whole = _residuals(likelihood, extended)
-    added = np.array([_residuals(likelihood, one) - whole for one in reduced]).reshape(len(reduced), whole.size)
-    inner = added @ added.T
-    sizes = np.sqrt(np.diag(inner) / max(whole.size, 1))
-    likeness = cosines(inner)
-    np.fill_diagonal(likeness, 0.0)
+    sizes, likeness = _sizes_and_likeness(reduced, extended)
     departures = thresholds.departure * np.array(best.departure_sds) * sizes
     present = excitation_of(likelihood.sessions, thresholds).tells_apart
     made = []
@@ -118,7 +113,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 laws,
                 reduced[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
-                float(likeness[k].max()),
+                float(likeness[k]),
                 ended[k],
                 tuple(_confounded_fit(law, reduced[k], extended) for law in rivals) if is_there else (),
                 extended.model.part(one.name).bends_too_little,
@@ -135,7 +130,7 @@ def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterio
     nor curves: two of them in a row follow what any curve does, and are compared with that (`Member.is_any_curve`).
     """
     likelihood, departure = extended.likelihood, evidence.thresholds.departure
-    whole, made = _residuals(likelihood, extended), []
+    made = []
     for kind in dict.fromkeys(one.effect.kind for one in members):
         own = [one for one in members if one.effect.kind == kind]
         others = [one for one in members if one.effect.kind != kind]
@@ -146,22 +141,34 @@ def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterio
             continue
         largest = max(own, key=lambda one: (not one.effect.is_flexible, one.size))
         without = fit(likelihood, extended.model.without(*names), FEW_STEPS)
-        added = [_residuals(likelihood, one) - whole for one in (without, *(other.without for other in others))]
-        inner = np.array(added) @ np.array(added).T
+        sizes, likeness = _sizes_and_likeness([without, *(one.without for one in others)], extended)
         left = tuple(m for m in best.members if evidence.linearisation.candidates[m].effect.kind != kind)
         made.append(
             replace(
                 largest,
-                size=float(np.sqrt(inner[0, 0] / max(whole.size, 1))),
+                size=float(sizes[0]),
                 fall=without.cost - extended.cost,
                 without=without,
                 alternatives=(Alternative(None, _margin_to(left, evidence, best)),),
                 others_departure_rms=departure * math.hypot(*(one.departure_sds * one.size for one in others)),
-                likeness=max([0.0, *cosines(inner)[0, 1:].tolist()]),
+                likeness=float(likeness[0]),
                 kin=tuple(one.name for one in own if one is not largest),
             )
         )
     return tuple(made)
+
+
+def _sizes_and_likeness(reduced: Sequence[Fit], extended: Fit) -> tuple[Array, Array]:
+    """(k,) rms of what each fit of ``reduced`` lacks of ``extended``, and its largest cosine with that of another.
+
+    The cosine is at least 0.
+    """
+    whole = _residuals(extended.likelihood, extended)
+    added = np.array([_residuals(extended.likelihood, one) - whole for one in reduced])
+    inner = added.reshape(len(reduced), whole.size) @ added.reshape(len(reduced), whole.size).T
+    likeness = cosines(inner)
+    np.fill_diagonal(likeness, 0.0)
+    return np.sqrt(np.diag(inner) / max(whole.size, 1)), likeness.max(axis=1, initial=0.0)
 
 
 def _margin_to(reduced: tuple[int, ...], evidence: Evidence, best: Posterior) -> float:

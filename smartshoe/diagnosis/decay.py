@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.display import duration
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95, white_noise_sd
@@ -223,11 +224,8 @@ def _of_order(at: Array, t: Array) -> Array:
 
 
 def _duration(time_s: float) -> str:
-    """A time in words, in s, min or h."""
-    for limit_s, unit_s, name in ((600.0, 1.0, "s"), (7200.0, 60.0, "min")):
-        if time_s < limit_s:
-            return f"{time_s / unit_s:.3g} {name}"
-    return f"{time_s / 3600.0:.2g} h"
+    """A time in words; one of hours is known to two digits at best."""
+    return duration(time_s, 600.0, 2)
 
 
 def _course_says(course: Course, order: float | None) -> str:

@@ -17,6 +17,7 @@ from smartshoe.diagnosis._inference import can_validate
 from smartshoe.diagnosis._limits import ONE_CYCLE
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised, logged_words
+from smartshoe.display import counted
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
@@ -148,7 +149,7 @@ def too_short_of(protocol: Protocol, sample_rate_hz: float, thresholds: Threshol
         return None
     return (
         f"protocol {protocol.name} lasts {protocol.duration_s:g} s, of which a log of {sample_rate_hz:g} Hz takes"
-        f" {samples} sample{'' if samples == 1 else 's'}, and a diagnosis needs {least}: make it longer, or raise"
+        f" {counted(samples, 'sample')}, and a diagnosis needs {least}: make it longer, or raise"
         " the sample rate"
     )
 

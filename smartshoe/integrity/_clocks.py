@@ -27,6 +27,7 @@ from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
+from smartshoe.signals.masks import runs_of
 
 # Resolutions: half and twice of each changed no finding in two cases.
 SMOOTHING = (1.0, 3.0, 6.0)  # echoes
@@ -333,13 +334,13 @@ def _by_windows(
     if not places:
         return None
     each = (np.array(one) for one in (places, smallest, peaks, weights))
-    return _WindowLags(grid, load, reading, smooth_s, _movements(d_load, moving), *each)
+    return _WindowLags(grid, load, reading, smooth_s, sum(movements_of(d_load, moving)), *each)
 
 
-def _movements(increments: Array, moving: Mask) -> int:
-    """How often a load with these ``increments`` (b,) begins to rise or to fall, where it is ``moving`` (b,)."""
-    way = np.where(moving, np.sign(increments), 0.0)
-    return int(np.count_nonzero((way != 0.0) & (np.diff(way, prepend=0.0) != 0.0)))
+def movements_of(increments: Array, moving: Mask) -> tuple[int, int]:
+    """How often a load with these ``increments`` (b,) rises, and falls, where it is ``moving`` (b,)."""
+    rises, falls = (runs_of(moving & (way * increments > 0.0))[0].size for way in (1.0, -1.0))
+    return rises, falls
 
 
 def _without_jumps(increments: Array, moving: Mask, thresholds: Thresholds) -> Array:

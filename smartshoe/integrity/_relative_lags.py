@@ -15,13 +15,12 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._answers import binned
-from smartshoe.integrity._clocks import Lags, clock_through, regressors_of
+from smartshoe.integrity._clocks import Lags, clock_through, movements_of, regressors_of
 from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
-from smartshoe.signals.masks import runs_of
 
 NEWTON_STEPS = 4  # a lag within what the smoothing spans is found in two
 NO_LAG = OneClock(0.0, 0.0)
@@ -49,8 +48,8 @@ class Increments:
     def edges(self, thresholds: Thresholds) -> int:
         """The number of times that the load rises, or falls if that is less often."""
         moves = self.regressors[:, 0]
-        least = thresholds.standing * float(np.abs(moves).max())
-        return min(runs_of(way * moves > least)[0].size for way in (1.0, -1.0))
+        size = np.abs(moves)
+        return min(movements_of(moves, size > thresholds.standing * float(size.max())))
 
     def without_lag(self, clock: OneClock | None) -> Increments:
         """The same with its reading earlier by the lag of ``clock``; itself if that is None."""

@@ -101,8 +101,12 @@ def _behind(load_n: Array, lag: float, delay: int, seed: int) -> Array:
     return 0.2 * lagged(late, 1.0, lag) + 0.08 * np.random.default_rng(seed).standard_normal(load_n.size)
 
 
-@pytest.mark.parametrize("count", [5, 12, 40])
-@pytest.mark.parametrize(("lag", "delay"), [(0.1, 0), (3.0, 2), (12.0, 1)])
+COUNTS = pytest.mark.parametrize("count", [5, 12, 40])
+UNITS = pytest.mark.parametrize(("lag", "delay"), [(0.1, 0), (3.0, 2), (12.0, 1)])
+
+
+@COUNTS
+@UNITS
 @settings(max_examples=6)
 @given(seed=st.integers(0, 2**16))
 def test_a_load_that_was_set_step_by_step_is_known_between_its_steps(
@@ -113,8 +117,8 @@ def test_a_load_that_was_set_step_by_step_is_known_between_its_steps(
     assert without_held([given_], STANDARD) == [(given_, [])]
 
 
-@pytest.mark.parametrize("count", [5, 12, 40])
-@pytest.mark.parametrize(("lag", "delay"), [(0.1, 0), (3.0, 2), (12.0, 1)])
+@COUNTS
+@UNITS
 @settings(max_examples=6)
 @given(seed=st.integers(0, 2**16))
 def test_a_load_that_went_on_while_its_value_stood_is_used_where_it_was_read(

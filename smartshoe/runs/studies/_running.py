@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.display import counted
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.files.atomic import json_text, results_folder, write_text
 from smartshoe.runs.studies._norms import Compared, Norm, compared, read_norms
@@ -52,7 +53,7 @@ class Band:
     @property
     def source(self) -> str:
         """The subjects that the band is based on, and how it was computed, as text."""
-        whom = f"this study's {self.subjects} subject{'' if self.subjects == 1 else 's'}"
+        whom = f"this study's {counted(self.subjects, 'subject')}"
         return f"{whom}: mean" if self.low is None else f"{whom}: mean and 95 % prediction interval"
 
     def to_dict(self) -> dict[str, Any]:
