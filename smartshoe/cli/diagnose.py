@@ -116,14 +116,14 @@ def command(
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
-            from smartshoe.report.diagnosis.folder import earlier_files, publish_diagnosis
+            from smartshoe.report.diagnosis.folder import publish_diagnosis
 
-            earlier = earlier_files(folder)
-            written = publish_diagnosis(
+            written, taken_away = publish_diagnosis(
                 folder, found, title, _facts(fitted, judges, is_refused=found.verdict == "refused"), figures
             )
-            if gone := [path.name for path in earlier if not path.exists()]:
-                note(f"{folder}: {first_names(gone)} of an earlier diagnosis taken away")
+            if taken_away:
+                gone = first_names([path.name for path in taken_away])
+                note(f"{folder}: {gone} of an earlier diagnosis taken away")
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, fitted, unit)

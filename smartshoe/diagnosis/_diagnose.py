@@ -63,6 +63,7 @@ def diagnose(
     unit_of([*fitted, *kept_out], "diagnose")
     fitted, limits_of_fitted = _spread(fitted, "to fit")
     kept_out, limits_of_kept_out = _spread(kept_out, "to judge on")
+    not_taken = limits_of_fitted + limits_of_kept_out
     everything, count = [*fitted, *kept_out], len(fitted)
     decided = decided_by(thresholds, material)
     integrity, shared = examine(everything, decided, count), twins(everything, decided)
@@ -75,17 +76,16 @@ def diagnose(
         k: said for k, one in enumerate(everything) if k not in left_out and (said := _pulled_reason(one, decided))
     }
     if any(k < count for k in pulled):
-        return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
+        return _refused(everything, integrity, [said for k, said in pulled.items() if k < count] + not_taken, decided)
     left_out |= pulled
     if all(k in left_out for k in range(count)):
-        return _refused(everything, integrity, list(left_out.values()), decided)
+        return _refused(everything, integrity, list(left_out.values()) + not_taken, decided)
     usable = tuple(mask & (k not in left_out) for k, mask in enumerate(alone))
     found = diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
     reasons = tuple(left_out.values())
     why_not = (*reasons, *(one.says for k, one in shared.items() if k not in left_out))
     limits = (
-        *limits_of_fitted,
-        *limits_of_kept_out,
+        *not_taken,
         *(f"left out: {why}" for why in why_not),
         *_limit_missing_predecessor(everything, count, left_out),
         *found.limits,

@@ -196,3 +196,8 @@ def test_of_very_many_recordings_those_that_are_used_do_not_hang_on_their_order(
     found = diagnose(given, hold_out=GOOD)
     assert found.verdict == "adequate"
     assert [one[:33] for one in found.limits if "are used" in one] == ["of 6 recordings to fit 3 are used"]
+    short = [one.taken(slice(0, 20 + k)) for k, one in enumerate(given)]  # too few samples to tell anything
+    found = diagnose(short)
+    assert found.verdict == "refused"
+    assert "are used" not in found.says
+    assert found.limits[-1].startswith("of 6 recordings to fit 3 are used")

@@ -31,7 +31,9 @@ def test_nothing_of_an_earlier_diagnosis_stays_beside_the_new_page_and_every_fil
     }
     for name, text in own.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    publish_diagnosis(tmp_path, case(later), "heel", {})
+    taken_away = publish_diagnosis(tmp_path, case(later), "heel", {}).taken_away
+    assert [path.name for path in taken_away if path.parent == tmp_path] == ["minor_loops.toml"]
+    assert {path.suffix for path in taken_away if path.parent != tmp_path} == {".svg", ".png"}
     assert _files(tmp_path) == {"diagnosis.html", "diagnosis.json", *own}
     assert {name: (tmp_path / name).read_text(encoding="utf-8") for name in own} == own
 

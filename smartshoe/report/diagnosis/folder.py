@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from smartshoe.diagnosis import Diagnosis
 from smartshoe.files.atomic import json_text, make_folder, write_text
@@ -17,14 +18,20 @@ FIGURES = (
 ENDINGS = ("svg", "pdf", "png")
 
 
+class Published(NamedTuple):
+    """What `publish_diagnosis` did: paths to report, by what they are, and files of an earlier diagnosis taken away."""
+
+    paths: dict[str, Path]
+    taken_away: list[Path]
+
+
 def publish_diagnosis(
     folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str], figures: Sequence[str] = ()
-) -> dict[str, Path]:
+) -> Published:
     """Write ``diagnosis.html``, ``diagnosis.json`` and the next protocol below ``folder``.
 
     ``figures`` are the `ENDINGS` of figures for papers. What an earlier diagnosis wrote there and this one does not, a
-    protocol or figures, is taken away last: beside the new page it would be taken for its own. Returns the paths to
-    report, by what they are.
+    protocol or figures, is taken away last: beside the new page it would be taken for its own.
     """
     page = folder / "diagnosis.html"
     written = {"report": page}
@@ -42,15 +49,15 @@ def publish_diagnosis(
 
         written["figures"] = make_folder(folder / "figures")
         kept |= set(write_figures(written["figures"], found, figures))
-    for path in earlier_files(folder):
-        if path not in kept:
-            path.unlink(missing_ok=True)
-            with suppress(OSError):  # a folder that is not empty is kept
-                path.parent.rmdir()
-    return written
+    earlier = [path for path in _earlier_files(folder) if path not in kept]
+    for path in earlier:
+        path.unlink(missing_ok=True)
+        with suppress(OSError):  # a folder that is not empty is kept
+            path.parent.rmdir()
+    return Published(written, earlier)
 
 
-def earlier_files(folder: Path) -> list[Path]:
+def _earlier_files(folder: Path) -> list[Path]:
     """The protocols and figures in ``folder`` that a diagnosis wrote there, and another one may not write again."""
     names = (f"diagnosis_{name}.{ending}" for name in FIGURES for ending in ENDINGS)
     figures = [path for name in names if (path := folder / "figures" / name).is_file()]

@@ -28,7 +28,7 @@ def _publish_diagnosis(
         return None
     own = make_folder(folder / "diagnosis" / unit.name)
     facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "smartshoe": __version__}
-    page = publish_diagnosis(own, found, unit.name, facts, figures)["report"]
+    page = publish_diagnosis(own, found, unit.name, facts, figures).paths["report"]
     if found.model is not None:
         saved = calibrated_on(found.calibration(unit=unit.name), diagnosed_on(unit.recordings, settings))
         saved.save(folder / "calibrations" / f"{unit.name}_extended.json")

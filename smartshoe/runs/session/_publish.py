@@ -112,7 +112,7 @@ def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | N
     if found is None:
         return None
     own = make_folder(folder / "diagnosis")
-    page = publish_diagnosis(own, found, plan.unit, {"smartshoe": __version__})["report"]
+    page = publish_diagnosis(own, found, plan.unit, {"smartshoe": __version__}).paths["report"]
     if found.model is not None:
         extended = found.calibration(unit=plan.unit, created=plan.created)
         calibrated_on(extended, list(result.recordings.values())).save(folder / f"{plan.unit}_extended.json")
