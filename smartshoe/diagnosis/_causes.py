@@ -118,15 +118,16 @@ def _how_sure(
 
 
 def _missed_by_law(law: Alternative | None, name: Name, thresholds: Thresholds) -> list[Statement]:
-    """How much of a flexible block the law that names it misses."""
+    """How much of a flexible block, or of a curve at the end of its kind, the law that names it misses."""
     if law is None:
         return []
     missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # a share of the fall of -2 log likelihood
     most = 100 * thresholds.departure**2
     much = "no more" if missed <= most else "more"
+    kept = "the free form" if name.member.effect.is_flexible else in_words(name.member.name)
     says = (
         f"its equation misses {percent(0.01 * missed)} of the effect, {much} than equations usually do: the extended"
-        " model keeps the free form, and the parameters are the equation's"
+        f" model keeps {kept}, and the parameters are the equation's"
     )
     return [Statement("share of its kind that the law misses in percent", missed, most, says)]
 

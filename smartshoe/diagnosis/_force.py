@@ -136,7 +136,10 @@ def limit_clipped(found: Compensation) -> list[str]:
     """The sentence on clipped samples, for which no force is judged."""
     if not found.clipped:
         return []
-    return [f"errors of the force leave out {percent(found.clipped)} of samples, which are clipped and tell no load"]
+    return [
+        f"errors of the force leave out {percent(found.clipped)} of samples, at which the extended model is clipped:"
+        " more than half of its slope is lost, so that a reading tells no load"
+    ]
 
 
 def limit_force(found: Compensation) -> list[str]:

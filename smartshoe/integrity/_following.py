@@ -56,10 +56,10 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         )
         if explained >= follows:
             says = (
-                f"the reading does not move with the load, though what is slow in it explains {100 * explained:.0f} %"
-                " of its variance, and what one half of the recording tells does not foretell the other: were both"
-                " recorded by one clock, and is this the unit that was pressed (of a slow one record several steps of"
-                " the load)?"
+                f"the reading does not go with the load throughout: what is slow in the load explains"
+                f" {100 * explained:.0f} % of its variance, but what one half of the recording tells does not foretell"
+                " the other: were both recorded by one clock, and is this the unit that was pressed (of a slow one"
+                " record several steps of the load)?"
             )
         if view.thresholds.clear * (moved_at_rest := _share_moved_at_rest(view)) > 1.0:
             says = (

@@ -283,6 +283,7 @@ def _told(
     alternatives: Any = (),
     equivalents: tuple[str, ...] = ("orifice_leak",),
     channels: frozenset[str] = frozenset(),
+    is_flexible: bool = True,
 ) -> Any:
     asked: list[Any] = []
 
@@ -294,6 +295,7 @@ def _told(
     monkeypatch.setattr(_causes, "parameters_of", lambda fit, name, scale: {"of": (fit, name, scale)})
     member = SimpleNamespace(
         kin=(),
+        effect=SimpleNamespace(is_flexible=is_flexible),
         name="static_curve_block",
         size=0.0123,
         without=SimpleNamespace(model=SimpleNamespace(held_as=lambda whole: f"without, held as {whole}")),
@@ -434,6 +436,9 @@ def test_a_block_that_is_called_by_its_nearest_law_has_that_laws_parameters(
         " free form, and the parameters are the equation's"
     )
     assert "linear_leak" not in [one.effect for one in cause.rivals]
+    # A curve at the end of its kind is another law's curve, and is what stays in the model.
+    cause = _told(monkeypatch, effect("linear_leak").exposed_by, kind_only=True, laws=laws, is_flexible=False)
+    assert "the extended model keeps static curve block, and" in str([one.says for one in cause.evidence])
     # Of one that no law was fitted for, the block's own are told, and of no equation what it misses.
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, kind_only=True, laws=laws[1:])
     assert cause.parameters["of"][1:] == ("static_curve_block", SCALE)

@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import InputError
 from smartshoe.files.logs._sheet import Column, Sheet
-from smartshoe.files.logs.picks import Pick, need_quantity, pick, titles
+from smartshoe.files.logs.picks import Pick, names_a_column, need_quantity, pick, titles
 from smartshoe.units import SECOND, Unit
 
 _TIME_NAMES = frozenset({"time", "t", "x_value", "zeit", "czas", "temps", "tijd", "tiempo", "时间"})
@@ -19,6 +19,7 @@ _TIME_NAMES = frozenset({"time", "t", "x_value", "zeit", "czas", "temps", "tijd"
 # 'rows[49Hz]': the rows have that rate; 'NAME[49Hz]': the column counts samples of that rate.
 _AT_A_RATE = re.compile(r"(?P<base>.*?)\s*\[\s*(?P<rate>\d+(\.\d*)?([eE]\d+)?)\s*(?P<kilo>k?)hz\s*\]\s*", re.IGNORECASE)
 _ROWS = frozenset({"rows", ""})
+_WITHOUT_UNIT = re.compile(r"rows\s*(\[[\s\d.]*\])?\s*", re.IGNORECASE)
 
 
 def time_of(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> tuple[int | None, Array]:
@@ -28,6 +29,8 @@ def time_of(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> t
     a column that counts samples. Raises `InputError` and its subclasses for a column that is not a time.
     """
     at_rate = _AT_A_RATE.fullmatch(choice) if choice is not None else None
+    if choice is not None and _WITHOUT_UNIT.fullmatch(choice) and not names_a_column(sheet, choice):
+        raise _no_rate(sheet, choice)
     if at_rate is None:
         found = _time_column(sheet, units, choice)
         return found.index, _seconds(
@@ -35,11 +38,16 @@ def time_of(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> t
         )
     rate_hz = float(at_rate["rate"]) * (1e3 if at_rate["kilo"] else 1.0)
     if rate_hz <= 0.0:
-        raise InputError(f"{sheet.path}: --time {choice!r} has no rate above 0: write it like 'rows[49Hz]'")
+        raise _no_rate(sheet, str(choice))
     if at_rate["base"].casefold() in _ROWS:
         return None, np.arange(sheet.columns[0].values.size) / rate_hz
     counting = pick(sheet, at_rate["base"], "--time").index
     return counting, _complete(sheet, sheet.columns[counting]) / rate_hz
+
+
+def _no_rate(sheet: Sheet, choice: str) -> InputError:
+    """The error of a choice of rows, or of a column that counts them, without a rate."""
+    return InputError(f"{sheet.path}: --time {choice!r} has no rate above 0: write it like 'rows[49Hz]'")
 
 
 def counts_rows(choice: str) -> bool:

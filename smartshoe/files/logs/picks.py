@@ -174,7 +174,7 @@ def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example
             also = f", or write '[{weight.symbol}]' behind its name for what such a mass weighs"
         elif in_unit.quantity == "unknown":
             also = f", or say in brackets what it is in ({_usual(option)})"
-        if quantity == "force" and in_unit.quantity == "length":  # a stretched unit is diagnosed like any other
+        elif quantity == "force" and in_unit.quantity != "time":  # a stretched or bent unit is diagnosed like any other
             also = f", or write '[{example}]' behind its name to use its numbers in the load's place"
         raise UnitError(
             f"{sheet.path}: column {sheet.columns[found.index].name!r} for {option} is in {in_unit.symbol}, which is"

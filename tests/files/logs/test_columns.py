@@ -131,7 +131,7 @@ FAULTS = [
     ({"force": "bare"}, InputError, r"no unit.*'bare\[N\]'"),
     ({"sensors": ["bare"]}, InputError, r"no unit.*'bare\[mbar\]'"),
     ({"time": "bare"}, InputError, r"no unit.*'bare\[s\]'"),
-    ({"force": "Pin"}, UnitError, "is in V, which is no force"),
+    ({"force": "Pin"}, UnitError, r"is in V, which is no force: .* write '\[N\]' behind its name to use its"),
     ({"force": "way"}, UnitError, r"is in mm, which is no force: .* write '\[N\]' behind its name to use its"),
     ({"time": "Load"}, UnitError, "is in N, which is no time"),
     ({"force": "Load[kN]"}, UnitError, "is in N by the file"),
@@ -222,8 +222,13 @@ def test_rows_without_times_take_a_rate() -> None:
     counted = sheet("row|", "Load|N", "Pin|V")
     counted.columns[0].values = np.array([10.0, 12.0, 13.0])
     assert recording_from(counted, time="row[0.05 kHz]").time_s == pytest.approx([0.2, 0.24, 0.26])
-    with pytest.raises(InputError, match="no rate above 0"):
-        recording_from(counted, time="row[0Hz]")
+    for rate in ("row[0Hz]", "rows", "Rows[10]", "rows []"):
+        with pytest.raises(InputError, match=r"no rate above 0: write it like 'rows\[49Hz\]'"):
+            recording_from(counted, time=rate)
+    with pytest.raises(UnitError, match="unit 'furlong'"):
+        recording_from(counted, time="rows[furlong]")
+    named = sheet("rows|s", "Load|N", "Pin|V")
+    assert recording_from(named, time="rows").time_s.tolist() == named.columns[0].values.tolist()
 
 
 def test_a_pressure_as_the_reference_is_the_force_on_a_square_centimetre() -> None:
