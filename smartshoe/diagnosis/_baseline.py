@@ -80,8 +80,7 @@ def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
 
 def has_arm_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
     """Whether the baseline's arm is beyond all usual time constants: then it follows an effect, not the wall."""
-    fastest_s, *_, slowest_s = thresholds.memory_s
-    return not fastest_s < 1.0 / model.relaxation_rate_per_s < slowest_s
+    return not thresholds.memory_s[0] < 1.0 / model.relaxation_rate_per_s < thresholds.memory_s[-1]
 
 
 def has_extreme_arm(model: ExtendedModel) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -114,9 +113,8 @@ def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:
 
 def _is_reproducible(recording: Recording, thresholds: Thresholds) -> bool:
     """Whether the branches of each half explain the other half, which chance branches would not."""
-    middle_s = 0.5 * float(recording.time_s[0] + recording.time_s[-1])
-    ends_s = (float(recording.time_s[0]), middle_s, float(recording.time_s[-1]))
-    halves = [recording.between(*span) for span in pairwise(ends_s)]
+    middle = len(recording) // 2
+    halves = [recording.taken(part) for part in (slice(0, middle), slice(middle, None))]
     for half, other in (halves, reversed(halves)):
         found, strokes = branches_of(half, thresholds), _strokes_of(other, thresholds)
         if found is None or strokes is None:

@@ -66,8 +66,9 @@ def diagnose(
     not_taken = limits_of_fitted + limits_of_kept_out
     everything, count = [*fitted, *kept_out], len(fitted)
     decided = decided_by(thresholds, material)
-    integrity, shared = examine(everything, decided, count), twins(everything, decided)
+    integrity = examine(everything, decided, count)
     everything = [*integrity.recordings]
+    shared = twins(everything, decided)
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
     alone = [mask & ~shared[k].at if k in shared else mask for k, mask in enumerate(integrity.usable)]
     copies = {k: one.says for k, one in shared.items() if alone[k].sum() < decided.least_samples}
@@ -85,8 +86,8 @@ def diagnose(
     reasons = tuple(left_out.values())
     why_not = (*reasons, *(one.says for k, one in shared.items() if k not in left_out))
     limits = (
-        *not_taken,
         *(f"left out: {why}" for why in why_not),
+        *not_taken,
         *_limit_missing_predecessor(everything, count, left_out),
         *found.limits,
     )

@@ -182,7 +182,7 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
     lowest, span = float(load.min()), min(1.0, max(float(np.ptp(load)), 1e-9))
     for first, last in rises_of(load, thresholds.cycle * span):
         rise = float(load[last] - load[first])
-        if rise < thresholds.cycle * span or load[last] <= 0.0:
+        if load[last] <= 0.0:
             continue
         part = (load[first : last + 1] - load[first]) / rise
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))

@@ -14,6 +14,7 @@ from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_terms_of
 from smartshoe.diagnosis._scale import Scale, reading_in
 from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.diagnosis._validation import rms_of
 from smartshoe.diagnosis._zero import mean_offset
 from smartshoe.display import percent, rounded
 from smartshoe.integrity.thresholds import Thresholds
@@ -302,6 +303,4 @@ def _error_without_own_n(
 
 def _rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
     """Root mean square of ``signals`` (n,) over the samples ``seen``; NaN where there are none."""
-    parts = [signal[mask] for signal, mask in zip(signals, seen, strict=True)]
-    count = sum(one.size for one in parts)
-    return math.sqrt(sum(float(one @ one) for one in parts) / count) if count else math.nan
+    return rms_of([signal[mask] for signal, mask in zip(signals, seen, strict=True)], math.nan)

@@ -257,7 +257,6 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     fitted = fit_of_set(state, best, likelihood)
     extended = left_out.consistent(fitted)
     refused = [name for name in fitted.model.names if name not in extended.model.names]
-    best = evidence.posterior(tuple(m for m in best.members if linearisation.candidates[m].name not in refused))
     cancelling_names = cancelling_effects(sessions, extended.model, state.thresholds)
     if cancelling_names:
         without = {name: fit(likelihood, extended.model.without(name)) for name in cancelling_names}

@@ -10,14 +10,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis._held_out import gains_and_zero_changes, own_terms_of
 from smartshoe.diagnosis._scale import reading_in
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity import coarse_step
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import find_unit
 
@@ -74,7 +73,7 @@ def _has_jump(session: Session, model: ExtendedModel, places: int, thresholds: T
         return False
     mean_steps = _mean_steps(session, residual, thresholds)
     usual_step = math.sqrt(float(np.mean(mean_steps**2)) * (free + shares.size) / free)
-    threshold = -float(stdtrit(free, 0.5 * thresholds.false_alarm / places)) * usual_step
+    threshold = largest_of_noise(places, thresholds, free) * usual_step
     ends = (0, *session.zero_changes, session.reading.size)
     for k, (at, share) in enumerate(zip(session.zero_changes, shares, strict=True)):
         observed = float(share + mean_steps[at])

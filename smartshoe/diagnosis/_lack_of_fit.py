@@ -18,11 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._session import Session
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import NORMAL_QUARTILE, autocovariance
 
 # Resolutions. Half and twice of each changed no name in two cases.
@@ -56,7 +55,7 @@ class LackOfFit:
     @property
     def _largest_of_noise(self) -> float:
         """The score that noise reaches with the probability of a false alarm."""
-        return -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
+        return largest_of_noise(1, self.thresholds, self.pairs - 1)
 
 
 def repeating_structure(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:

@@ -15,10 +15,10 @@ from smartshoe.diagnosis._gains_and_zeros import changes_of, time_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
 from smartshoe.diagnosis._members import start_with
-from smartshoe.diagnosis._ranges import rounded
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._sensitivity import logged_words
 from smartshoe.diagnosis._session import Session
+from smartshoe.display import rounded
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
@@ -104,10 +104,10 @@ def _with_its_loads(proposed: NextExperiment, sessions: Sequence[Session], thres
     if proposed.steps is None:
         return proposed
     rate, recorded = proposed.steps.peak_rate_n_per_s, max(_fastest_n_per_s(one.recording) for one in sessions)
-    asks = f"it loads to {rounded(proposed.steps.peak_load_n)} N at up to {rounded(rate)} N/s"
+    asks = f"it loads to {rounded(proposed.steps.peak_load_n, 3)} N at up to {rounded(rate, 3)} N/s"
     if rate > (1.0 + thresholds.same) * recorded:
         asks += (
-            f", faster than anything recorded (up to {rounded(recorded)} N/s): if the machine cannot, let its fast"
+            f", faster than anything recorded (up to {rounded(recorded, 3)} N/s): if the machine cannot, let its fast"
             " ramps take longer, and expect it to tell less"
         )
     return replace(proposed, says=f"{proposed.says}; {asks}")

@@ -11,6 +11,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session
+from smartshoe.display import rounded
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.exposure import LATER_CYCLES, SAYS
 
@@ -60,9 +61,9 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     if thresholds.clear * low > high and not any(within):
         trap = True
         said.append(
-            f"the load stays at {rounded(low * scale.load_n)} to {rounded(high * scale.load_n)} N throughout, and the"
-            " reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load it"
-            " over its range)"
+            f"the load stays at {rounded(low * scale.load_n, 3)} to {rounded(high * scale.load_n, 3)} N throughout, and"
+            " the reading does not go with it: nothing shows how the unit answers a load, and no cause is named (load"
+            " it over its range)"
         )
     said += _limit_flat_reading(pairs, scale, thresholds)
     judged = [one for one in sessions if not _has_enough(one.fitted) and _has_enough(one.judged)]
@@ -107,7 +108,7 @@ def _limit_flat_reading(pairs: Sequence[tuple[Array, Array]], scale: Scale, thre
     if ends - begins < thresholds.same * float(np.ptp(load)) or first + 1 >= len(groups):
         return []
     return [
-        f"above {rounded(begins * scale.load_n)} N the reading stands still, to {100.0 * thresholds.standing:g} % of"
+        f"above {rounded(begins * scale.load_n, 3)} N the reading stands still, to {100.0 * thresholds.standing:g} % of"
         " its span: no force can be told there, and none that is compensated is to be believed"
     ]
 
@@ -184,7 +185,7 @@ def loads_beyond_fit(sessions: Sequence[Session], scale: Scale, thresholds: Thre
     for does, unit, factor, of in ways:
         known, asked = (max((of(*one) for one in some), default=0.0) for some in (fitted, judged))
         if asked > (1.0 + thresholds.same) * known:
-            said.append(f"{does} {rounded(asked * factor)} {unit} ({rounded(known * factor)} in what was fitted)")
+            said.append(f"{does} {rounded(asked * factor, 3)} {unit} ({rounded(known * factor, 3)} in what was fitted)")
     there, asked_for = (
         excitation_of(some, thresholds).present - LATER_CYCLES - {"rates"}
         for some in (sessions, [replace(one, held_out=~one.held_out) for one in sessions])
@@ -193,11 +194,6 @@ def loads_beyond_fit(sessions: Sequence[Session], scale: Scale, thresholds: Thre
     if lacking := sorted(SAYS[word] for word in asked_for - there):
         parts.append(f"what was fitted lacks {', '.join(lacking)}")
     return "; ".join(parts) or None
-
-
-def rounded(value: float) -> str:
-    """A number with three digits and thousands separators."""
-    return f"{float(f'{value:.3g}'):,g}"
 
 
 def _gain(load: Array, reading: Array, follows: float) -> float | None:

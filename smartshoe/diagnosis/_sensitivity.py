@@ -195,14 +195,13 @@ class Linearised:
     @property
     def nuisance_counts(self) -> list[int]:
         """The number k of nuisances of each session."""
-        return [baseline_count.shape[1] for baseline_count in self.nuisances]
+        return [one.shape[1] for one in self.nuisances]
 
     @cached_property
     def fitted_nuisances(self) -> tuple[Array, ...]:
         """``nuisances`` over the fitted samples."""
         return tuple(
-            rows_where(session.fitted, baseline_count)
-            for baseline_count, session in zip(self.nuisances, self.sessions, strict=True)
+            rows_where(session.fitted, own) for own, session in zip(self.nuisances, self.sessions, strict=True)
         )
 
     @cached_property

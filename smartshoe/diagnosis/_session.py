@@ -178,7 +178,7 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
 
 def content_of(recording: Recording) -> tuple[float, ...]:
     """Length, duration and mean load and reading: numbers that order recordings alike in any unit."""
-    means = (float(np.mean(one.si)) for one in (recording.load, recording.sensor))
+    means = (float(np.mean(one.si)) for one in recording.loads_and_sensors)
     return recording.time_s.size, recording.duration_s, *means
 
 
@@ -410,9 +410,7 @@ def smoothed(signal: Array, weights: Array, factor: int) -> Array:
     half = weights.size // 2
     if not half:
         return np.array(signal[::factor], dtype=float)
-    left = 2 * signal[0] - signal[half:0:-1]
-    right = 2 * signal[-1] - signal[-2 : -half - 2 : -1]
-    return np.convolve(np.concatenate([left, signal, right]), weights, "valid")[::factor]
+    return np.convolve(np.pad(signal, half, "reflect", reflect_type="odd"), weights, "valid")[::factor]
 
 
 def _auxiliary_channels(recording: Recording, time_s: Array, scale: Scale) -> dict[str, Array]:
@@ -453,7 +451,7 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     # A share of full scale, or of the record's own span where that is smaller.
     threshold = thresholds.cycle * min(1.0, max(float(np.ptp(load)), 1e-9))
     # A cycle begins at the foot of a rise, after a rest at its last low sample.
-    feet = [foot for foot, top in rises_of(load, threshold) if load[top] - load[foot] > threshold]
+    feet = [foot for foot, _ in rises_of(load, threshold)]
     starts = []
     for foot in feet:
         level = load[foot] + 0.25 * threshold

@@ -250,18 +250,18 @@ def _contributions(sessions: Sequence[Session], whole: Sequence[Array], less: Ex
 
 def _centred_rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
     """Rms of ``signals`` (n,) over the samples ``seen``, each about its own mean."""
-    parts = [signal[mask] - signal[mask].mean() for signal, mask in zip(signals, seen, strict=True) if mask.any()]
-    return math.sqrt(sum(float(one @ one) for one in parts) / max(sum(one.size for one in parts), 1))
+    return rms_of([part - part.mean() for one, mask in zip(signals, seen, strict=True) if (part := one[mask]).size])
 
 
 def fitted_rms(sessions: Sequence[Session], signals: Sequence[Array]) -> float:
     """Rms of ``signals``, (n,) for each session, over the fitted samples."""
-    square, count = 0.0, 0
-    for session, signal in zip(sessions, signals, strict=True):
-        fitted = signal[session.fitted]
-        square += float(fitted @ fitted)
-        count += fitted.size
-    return float(np.sqrt(square / max(count, 1)))
+    return rms_of([signal[one.fitted] for one, signal in zip(sessions, signals, strict=True)])
+
+
+def rms_of(parts: Sequence[Array], nothing: float = 0.0) -> float:
+    """Root mean square over all ``parts`` (n,); ``nothing`` of no sample."""
+    count = sum(one.size for one in parts)
+    return math.sqrt(sum(float(one @ one) for one in parts) / count) if count else nothing
 
 
 def _in_standard_errors(gains: Array) -> float:

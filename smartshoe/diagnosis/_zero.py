@@ -107,8 +107,9 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         if command is not None:
             # By the command alone, since a large tare hides a rest in the load.
             full = float(np.max(np.abs(command))) or 1.0
-            nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
-            resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < thresholds.standing)
+            since_s = session.recording.time_s - session.recording.time_s[0]
+            asked = np.interp(session.conditions.time_s, since_s, np.abs(command))
+            resting = (asked < 1e-3 * full) & (np.abs(load - load[0]) < thresholds.standing)
         elif begins_unloaded(load, session.reading, session.conditions.step_s, thresholds):
             resting = np.abs(load - load[0]) < thresholds.standing
         resting = resting & (np.abs(at_rest - at_rest[0]) < thresholds.standing * model.gain)

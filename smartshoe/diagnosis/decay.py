@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.display import duration
-from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.integrity.thresholds import Thresholds, decided_by, largest_of_noise
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95, white_noise_sd
 
@@ -48,7 +48,7 @@ class Decay:
 
 def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Decay | None:
     """The decay of the first sensor's reading; None if the load moves, or the reading does not fall steadily."""
-    thresholds = thresholds or Thresholds()
+    thresholds = decided_by(thresholds)
     standing = _load_stands_still(recording, thresholds.standing)
     if standing is None or not recording.sensors:
         return None
@@ -56,7 +56,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
     present = sensor.present
     if present.sum() < thresholds.least_samples:
         return None
-    points = thresholds.bins // 8  # a smooth fall needs few points
+    points = max(thresholds.bins // 8, thresholds.least_samples)  # a smooth fall needs few points
     time_s, reading, sign = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present], points)
     noise = largest_of_noise(reading.size, thresholds) * white_noise_sd(reading)
     end = max(time_s.size // 20, 3)

@@ -19,7 +19,7 @@ from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised, logged_words
 from smartshoe.display import counted
 from smartshoe.errors import UsageError
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import catalogue
 from smartshoe.models.extended import ExtendedModel
@@ -118,7 +118,7 @@ def design(
     given = {"noise_percent": noise_percent, "strength_percent": strength_percent, "sample_rate_hz": sample_rate_hz}
     for name, value in given.items():
         require_positive(value, name)
-    limits = thresholds or Thresholds()
+    limits = decided_by(thresholds)
     peak_n = max(protocol.peak_load_n for protocol in protocols)
     if not peak_n > 0:
         raise UsageError(
@@ -144,7 +144,7 @@ def design(
 
 def too_short_of(protocol: Protocol, sample_rate_hz: float, thresholds: Thresholds | None = None) -> str | None:
     """The sentence on a protocol whose log has fewer samples than a diagnosis needs; None if it has enough."""
-    samples, least = math.ceil(protocol.duration_s * sample_rate_hz), (thresholds or Thresholds()).least_samples
+    samples, least = math.ceil(protocol.duration_s * sample_rate_hz), decided_by(thresholds).least_samples
     if samples >= least:
         return None
     return (

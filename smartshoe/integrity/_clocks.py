@@ -84,12 +84,12 @@ def align(view: View) -> tuple[View, Lags]:
             view, followed = turned, over
     if followed is None:
         return view, UNSEEN
-    seen = Lags(followed.places - view.time_s[0], followed.best)
+    seen = Lags(followed.places - view.recording.time_s[0], followed.best)
     line = _lag_line(view, followed) if _correlates(followed, view.thresholds) else None
     if line is None:
         return view, seen
     offset_s, rate = line
-    middle = 0.5 * (view.time_s[0] + view.time_s[-1])
+    middle = _middle_of(view)
     moved = view.time_s - offset_s - rate * (view.time_s - middle)
     load = np.interp(moved, view.time_s, view.load.values)
     return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate), seen
@@ -207,13 +207,13 @@ def _correlates(of: _WindowLags | None, thresholds: Thresholds) -> bool:
 
 def _lag_line(view: View, of: _WindowLags) -> tuple[float, float] | None:
     """The lag in the middle of the recording in s and its rate in s per s, or None where the clocks agree."""
-    duration_s = float(view.time_s[-1] - view.time_s[0])
+    duration_s = view.recording.duration_s
     given = view.thresholds
     grid, places = of.grid, of.places
     if of.movements < given.few:  # a curve, too, makes the rise late and the fall early
         return None
     least = _least_lag_s(view)
-    middle = 0.5 * (view.time_s[0] + view.time_s[-1])
+    middle = _middle_of(view)
     as_logged, repeating = None, _repeats_itself(of.load, given)
     # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
     for lags, earned in ((of.smallest, 1.0 - given.same), (of.best, 1.0 / given.clear)):
@@ -241,6 +241,11 @@ def _lag_line(view: View, of: _WindowLags) -> tuple[float, float] | None:
         if offered:
             return min(offered)[1:]
     return None
+
+
+def _middle_of(view: View) -> float:
+    """The middle of the recording in s, also where load or reading is missing at an end."""
+    return 0.5 * float(view.recording.time_s[0] + view.recording.time_s[-1])
 
 
 def _is_one_sine(load: Array, thresholds: Thresholds) -> bool:
@@ -428,8 +433,7 @@ def _slope(places: Array, lags: Array) -> float:
 
 def _middle(values: Array, weights: Array) -> float:
     """The weighted median."""
-    order = np.argsort(values)
-    return float(values[order][np.searchsorted(np.cumsum(weights[order]) / weights.sum(), 0.5)])
+    return float(np.quantile(values, 0.5, weights=weights, method="inverted_cdf"))
 
 
 def _increments(of: _WindowLags, load: Array, thresholds: Thresholds) -> tuple[Array, Array]:

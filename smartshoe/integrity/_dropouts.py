@@ -195,6 +195,8 @@ def _falls_to_one_level(view: View, at: Mask) -> bool:
     3. Of three runs and more the levels scatter less than the losses do, or no more than noise.
     4. Runs of one or two samples must be three at least and from different loads, since a spike may fall anywhere.
     """
+    from scipy.stats import median_abs_deviation
+
     y, given = view.reading.values, view.thresholds
     most = 1.0 - given.same
     starts, stops = runs_of(at)
@@ -208,7 +210,7 @@ def _falls_to_one_level(view: View, at: Mask) -> bool:
     lost = np.maximum(before, view.expected[starts]) - levels
     noise = view.reading.quiet_noise + view.reading.step
     if lost.max() < given.same * view.span or (
-        starts.size > 2 and _median_deviation(levels) > max(_median_deviation(lost), noise)
+        starts.size > 2 and median_abs_deviation(levels) > max(median_abs_deviation(lost), noise)
     ):
         return False
     short = int((stops - starts).max()) <= 2
@@ -223,8 +225,3 @@ def _stays_there(part: Array, view: View) -> bool:
     moved = abs(float(part[-third:].mean() - part[:third].mean()))
     noise = view.reading.largest * view.reading.quiet_noise * (2.0 / third) ** 0.5
     return bool(moved <= noise + view.thresholds.standing * view.span)
-
-
-def _median_deviation(values: Array) -> float:
-    """The median distance from the median."""
-    return float(np.median(np.abs(values - np.median(values))))

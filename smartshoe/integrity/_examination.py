@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -176,7 +176,9 @@ def _cleaned(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_C
         measured, interpolated = without_interpolated(at_own_rate, thresholds)
         logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
-        thinned = (*blank, *held, *interpolated)  # samples that are no measurements of their own
+        thinned = [  # samples that are no measurements of their own; each is of all that remain in the end
+            replace(one, at=np.ones(len(recording), dtype=bool)) for one in (*blank, *held, *interpolated)
+        ]
         cleaned.append(_Cleaned(logged, recording, (*thinned, *wrapped, *wild), bool(thinned)))
     return cleaned
 

@@ -180,6 +180,8 @@ def _followed_share(view: View) -> tuple[float, float]:
     count = n // width
     load = view.load.values[: count * width].reshape(count, width).mean(axis=1)
     reading = np.median(view.reading.values[: count * width].reshape(count, width), axis=1)
+    if np.ptp(load) == 0.0:
+        return 0.0, 0.0
     curve = np.interp(load, view.curve[0], view.curve[1])
     columns = np.concatenate(
         [load_regressors(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1

@@ -75,11 +75,14 @@ def _is_staircase(name: str, count: int, recordings: Sequence[Recording], thresh
         came_at = np.flatnonzero(np.diff(load)) + 1
         if came_at.size < thresholds.few**2:
             continue
-        taken = slice(int(came_at[0]), int(came_at[-1]) + 1, max(count // PER_HOLD, 1))
+        step = max(count // PER_HOLD, 1)
+        width = step * thresholds.bins
+        busiest = int(came_at[np.argmax(np.searchsorted(came_at, came_at + width) - np.arange(came_at.size))])
+        taken = slice(busiest, min(busiest + width, int(came_at[-1]) + 1), step)
         lines = np.interp(np.arange(load.size), *_corners_of(load, count))
         half = max(count // taken.step // 2, 1)
         stood, went_on = (
-            total + _squares_of_increments(one[taken][: thresholds.bins], reading[taken][: thresholds.bins], half)
+            total + _squares_of_increments(one[taken], reading[taken], half)
             for total, one in ((stood, load), (went_on, lines))
         )
     return thresholds.clear * stood < went_on

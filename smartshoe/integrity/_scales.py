@@ -73,7 +73,7 @@ def slope_change(values: Array, noise: Array, near: int, largest: float) -> Arra
     from scipy.ndimage import maximum_filter1d
 
     n = values.size
-    padded = np.concatenate([np.full(near, values[0]), values, np.full(near, values[-1])])
+    padded = np.pad(values, near, "edge")
     over_near = np.abs(padded[2 * near :] - 2.0 * values + padded[:n]) / near
     over_near = np.maximum(over_near - largest * SECOND_DIFFERENCE * noise / near, 0.0)
     at_once = np.zeros(n)
@@ -89,7 +89,7 @@ def own_corner(values: Array, near: int) -> Array:
     """
     reach = max(near, 4)  # two increments on either side
     n = values.size
-    padded = np.concatenate([np.full(reach, values[0]), values, np.full(reach, values[-1])])
+    padded = np.pad(values, reach, "edge")
     after = padded[2 * reach : 2 * reach + n] - padded[reach + 2 : reach + 2 + n]
     before = padded[reach - 2 : reach - 2 + n] - padded[:n]
     return np.asarray(np.abs(after - before) / (reach - 2))

@@ -35,7 +35,6 @@ class Thresholds:
         "share of full scale",
         "standard deviation of what any effect adds to a good unit",
         "0.02 % of full scale",
-        least=0.0,
     )
     departure: float = threshold(
         0.25,
@@ -289,8 +288,12 @@ def _described(one: Field[Any], value: Any) -> dict[str, Any]:
     return {"name": one.name, "value": value, "unit": said["unit"], "meaning": said["meaning"], "origin": origin}
 
 
-def largest_of_noise(count: int, thresholds: Thresholds) -> float:
-    """How many standard deviations the largest size among ``count`` normal deviates exceeds by a false alarm only."""
-    from scipy.special import ndtri
+def largest_of_noise(count: int, thresholds: Thresholds, freedom: float = math.inf) -> float:
+    """How many standard deviations the largest size among ``count`` normal deviates exceeds by a false alarm only.
 
-    return -float(ndtri(0.5 * thresholds.false_alarm / count))
+    ``freedom``: degrees of freedom of the standard deviation, where that is estimated (Student's t).
+    """
+    from scipy.special import ndtri, stdtrit
+
+    tail = 0.5 * thresholds.false_alarm / count
+    return -float(ndtri(tail) if math.isinf(freedom) else stdtrit(freedom, tail))

@@ -60,8 +60,9 @@ def turning_points(load_n: Array, threshold_n: float) -> list[int]:
 
 
 def rises_of(load_n: Array, threshold_n: float) -> list[tuple[int, int]]:
-    """Pairs of samples (foot, top) of each rise of a load (n,) between its `turning_points`."""
-    return [(a, b) for a, b in pairwise(turning_points(load_n, threshold_n)) if load_n[b] > load_n[a]]
+    """Pairs of samples (foot, top) of each rise of a load (n,) by more than ``threshold_n``, which noise is below."""
+    points = turning_points(load_n, threshold_n)
+    return [(foot, top) for foot, top in pairwise(points) if load_n[top] - load_n[foot] > threshold_n]
 
 
 def ramps(time_s: Array, load_n: Array) -> list[Ramp]:

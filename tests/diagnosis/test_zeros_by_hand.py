@@ -340,13 +340,13 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     assert first_rests([one], MODEL, STANDARD).size == 0
     for asked, is_told in ((0.99, True), (1.01, False), (-0.99, True), (-1.01, False)):
         command = np.concatenate([np.full(10, asked), np.linspace(1.0, -1000.0, 80)])
-        one.recording = SimpleNamespace(command_n=command, metadata={})
+        one.recording = SimpleNamespace(command_n=command, metadata={}, time_s=one.conditions.time_s)
         found = first_rests([one], MODEL, STANDARD)
         assert found.shape == ((1, 6) if is_told else (0, 6))
         if is_told:
             assert found[0, :2] == pytest.approx([0.3, 0.2 / 0.8])
     moved = _rested(30, level=0.3, reading=0.2)
-    moved.recording = SimpleNamespace(command_n=np.zeros(90), metadata={})
+    moved.recording = SimpleNamespace(command_n=np.zeros(90), metadata={}, time_s=moved.conditions.time_s)
     moved.conditions.load[3:] = 0.3 + 0.02
     assert first_rests([moved], MODEL, STANDARD).size == 0
     # A command at the full rate is taken at the thinned samples; one that ends earlier has no rest beyond.
@@ -354,7 +354,7 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     thin.thinned, thin.resting[:] = 3, False
     command = np.full(90, 500.0)
     command[0:12:3] = 0.0
-    thin.recording = SimpleNamespace(command_n=command, metadata={})
+    thin.recording = SimpleNamespace(command_n=command, metadata={}, time_s=np.arange(90) * thin.conditions.step_s / 3)
     assert first_rests([thin], MODEL, STANDARD).shape == (1, 6)
     command[0] = 500.0
     assert first_rests([thin], MODEL, STANDARD).size == 0

@@ -165,7 +165,7 @@ def test_where_nothing_is_asked_for_the_record_decides_as_it_is() -> None:
         ("standing", float("nan"), "a number above 0 and at most 0.5"),
         ("hold_s", None, "a number above 0"),
         ("hold_s", float("inf"), "a number above 0"),
-        ("imperfection", -1e-4, "a number of at least 0"),
+        ("imperfection", 0.0, "a number above 0"),
         ("strength_sd", 0.0, "a number above 0"),
         ("false_name", 0.0, "a number above 0 and at most 1"),
         ("false_alarm", 1.5, "a number above 0 and at most 1"),
