@@ -11,11 +11,12 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from smartshoe.arrays import Mask
-from smartshoe.diagnosis._session import LEAST_WINDOW, Session, have_later_cycles
+from smartshoe.diagnosis._averaging import LEAST_WINDOW
+from smartshoe.diagnosis._load_cycles import have_later_cycles, least_rise, rises_in
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import LATER_CYCLES
-from smartshoe.signals.loading import rises_of
 from smartshoe.signals.masks import runs_of
 
 
@@ -179,8 +180,8 @@ class _Rise(NamedTuple):
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
     """The rises of a session's load that count as load cycles."""
     load, step_s = session.conditions.load, session.conditions.step_s
-    lowest, span = float(load.min()), min(1.0, max(float(np.ptp(load)), 1e-9))
-    for first, last in rises_of(load, thresholds.cycle * span):
+    lowest, least = float(load.min()), least_rise(load, thresholds)
+    for first, last in rises_in(session.conditions, thresholds):
         rise = float(load[last] - load[first])
         if load[last] <= 0.0:
             continue
@@ -188,7 +189,7 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
         is_rated = samples * thresholds.same >= 1.0 or session.thinned > 1  # else a single sample changes the rate
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
-        above = float(load[first]) - lowest > thresholds.clear * thresholds.cycle * span
+        above = float(load[first]) - lowest > thresholds.clear * least
         is_cut = last + 1 == load.size
         yield _Rise(rate, samples * _windows(session), float(load[last]), above, is_rated, is_cut)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
-from smartshoe.diagnosis._held_out import own_terms_of
+from smartshoe.diagnosis._own_terms import own_terms_of
 from smartshoe.diagnosis._scale import Scale, reading_in
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import rms_of

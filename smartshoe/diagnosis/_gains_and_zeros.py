@@ -17,10 +17,10 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._evidence import Evidence, Members
-from smartshoe.diagnosis._held_out import gains_and_zero_changes, own_terms_of, residual_of
 from smartshoe.diagnosis._jumps import any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood
 from smartshoe.diagnosis._noise import effective_noise_sd
+from smartshoe.diagnosis._own_terms import gains_and_zero_changes, own_terms_of, residual_of
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._search import backward_eliminated, search
 from smartshoe.diagnosis._session import Session, fitted_of

@@ -26,15 +26,16 @@ from smartshoe.diagnosis._gains_and_zeros import (
     with_own_terms,
     zero_changes_of,
 )
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier_changes, with_laws
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit
+from smartshoe.diagnosis._load_cycles import load_cycles
 from smartshoe.diagnosis._members import Member, members_of, taken_together
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import effective_noise_sd
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
-from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import (
     Progress,
     law_or_block,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smartshoe.arrays import Array, Index
-from smartshoe.diagnosis._held_out import gains_and_zero_changes, own_terms_of
+from smartshoe.diagnosis._own_terms import gains_and_zero_changes, own_terms_of
 from smartshoe.diagnosis._scale import reading_in
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity import coarse_step

@@ -12,8 +12,8 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._baseline import has_arm_beyond_memory, has_extreme_arm
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import BREADTH, RIVALS, best_additions, is_admissible
 from smartshoe.diagnosis._sensitivity import Candidate, available_effects, cosines, logged_channels
 from smartshoe.diagnosis._session import Session

@@ -10,11 +10,12 @@ from smartshoe.diagnosis._aligned import Aligned, aligned, with_lags_removed
 from smartshoe.diagnosis._baseline import baseline_of, has_negative_gain, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._grid import longest_step_s
 from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import logged_words
-from smartshoe.diagnosis._session import Session, at_full_rate, longest_step_s, prepare
+from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.diagnosis._slow_stretches import limit_slow_stretches
 from smartshoe.display import first_names
 from smartshoe.integrity import Integrity

@@ -21,7 +21,7 @@ from smartshoe.diagnosis._force import (
     limit_not_undone,
     limit_unsound_readings,
 )
-from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_terms_of, residual_of
+from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain
 from smartshoe.diagnosis._inference import Inference, infer_with_gas_check
 from smartshoe.diagnosis._lack_of_fit import repeating_structure
 from smartshoe.diagnosis._likelihood import Fit
@@ -40,6 +40,7 @@ from smartshoe.diagnosis._limits import (
 )
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
+from smartshoe.diagnosis._own_terms import own_terms_of, residual_of
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import loads_beyond_fit
@@ -163,10 +164,10 @@ def diagnosed(
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
-        model=_with_offset(adopted.model, named.zeros, sessions, scale),
+        model=_with_offset(adopted.model, sessions, scale),
         rejected=extended if gained.is_rejected else None,
         baseline_model=plain,
-        force_model=_with_offset(force.model, named.zeros, force.fine, scale, force.undone) if has_own else None,
+        force_model=_with_offset(force.model, force.fine, scale, force.undone) if has_own else None,
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, plain, extended, scale) for session in fine),
@@ -428,22 +429,15 @@ def _percent_less(after: float, before: float) -> float:
 
 
 def _with_offset(
-    model: ExtendedModel,
-    zeros: Sequence[Zero],
-    sessions: Sequence[Session],
-    scale: Scale,
-    undone: ExtendedModel | None = None,
+    model: ExtendedModel, sessions: Sequence[Session], scale: Scale, undone: ExtendedModel | None = None
 ) -> ExtendedModel:
-    """``model`` with the recordings' mean offset, so that it gives readings as logged.
+    """``model`` with the recordings' mean offset, so that it gives readings as logged for loads as logged.
 
-    Also where an offset is named, since the model may be off at the rest that shows it. With ``undone``, the part of
-    the model that is undone, the offset is that with this part only.
+    Also where an offset is named, since the model may be off at the rest that shows it. A tare that is named is in it
+    as well: curves were fitted to the load as logged, so that a tare before them would move them. With ``undone``, the
+    part of the model that is undone, the offset is that with this part only.
     """
-    tares = [(zero.effect, np.array([zero.value])) for zero in zeros if zero.effect.shifts == "load"]
-    of = undone or model
-    for tare in tares:
-        model, of = model.with_part(*tare), of.with_part(*tare)
-    offset = mean_offset(sessions, of) + scale.zero / scale.reading
+    offset = mean_offset(sessions, undone or model) + scale.zero / scale.reading
     if offset == 0.0:
         return model
     return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the gain is applied last

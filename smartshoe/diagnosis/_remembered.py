@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import rows_of
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._noise import FLOOR
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._sensitivity import nuisances
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity.thresholds import Thresholds

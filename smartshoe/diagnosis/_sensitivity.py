@@ -18,8 +18,9 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
+from smartshoe.diagnosis._load_cycles import have_later_cycles
 from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
-from smartshoe.diagnosis._session import Session, fitted_of, have_later_cycles
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family, origin_of

@@ -8,29 +8,26 @@ the filter removes most of it, and a fit costs a fraction.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.diagnosis._averaging import kernel, smoothed, thinning_weights
+from smartshoe.diagnosis._continuation import History, by_continuation, history_after, predecessor
 from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
+from smartshoe.diagnosis._grid import logged_on_grid, longest_step_s
 from smartshoe.diagnosis._jittered import with_sampling_jitter
-from smartshoe.diagnosis._neighbours import neighbours_of
-from smartshoe.diagnosis._scale import Scale, reading_in
-from smartshoe.diagnosis._slow_stretches import spacing_of
+from smartshoe.diagnosis._load_cycles import cycles_of
+from smartshoe.diagnosis._rest import load_at_rest, with_level_rests
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
-from smartshoe.models.effects.cycle_conditioning import half_way
 from smartshoe.recording import Recording
-from smartshoe.signals.loading import rises_of
-from smartshoe.signals.masks import bridged, runs_of
-from smartshoe.units import Unit
-
-LEAST_WINDOW = 3  # samples on either side of the average, a resolution: half and twice changed no name in two cases
+from smartshoe.signals.masks import runs_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,13 +117,13 @@ def prepare(
     """
     factors = [*factors, *[min(factors)] * (len(recordings) - len(factors))]
     made: dict[int, Session] = {}
-    histories: dict[str | None, _History] = {}
-    order = _by_continuation(recordings)
+    histories: dict[str | None, History] = {}
+    order = by_continuation(recordings)
     for index in order:
         recording = recordings[index]
-        past = histories.get(_predecessor(recording), _History())
+        past = histories.get(predecessor(recording), History())
         made[index] = _session(recording, index, usable[index], scale, factors[index], past, thresholds)
-        histories[recording.name] = _history_after(made[index].conditions, thresholds)
+        histories[recording.name] = history_after(made[index].conditions, thresholds)
     sessions = _with_common_temperature_zero([made[index] for index in range(len(recordings))])
     if held_out is not None:
         return [
@@ -160,76 +157,16 @@ def _with_common_temperature_zero(sessions: Sequence[Session]) -> list[Session]:
     ]
 
 
-def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
-    """The recordings' places ordered by content, but each after the one that it continues.
-
-    Names only tell which continues which: a renamed file is the same data.
-    """
-    order: list[int] = []
-    waiting = sorted(range(len(recordings)), key=lambda k: content_of(recordings[k]))
-    while waiting:
-        names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
-        ready = [k for k in waiting if names[_predecessor(recordings[k])] <= continues(recordings[k], recordings[k])]
-        placed = {*(ready or waiting)}  # in a ring of recordings that continue each other none is the first
-        order += [k for k in waiting if k in placed]
-        waiting = [k for k in waiting if k not in placed]
-    return order
-
-
-def content_of(recording: Recording) -> tuple[float, ...]:
-    """Length, duration and mean load and reading: numbers that order recordings alike in any unit."""
-    means = (float(np.mean(one.si)) for one in recording.loads_and_sensors)
-    return recording.time_s.size, recording.duration_s, *means
-
-
-def without_predecessor(recordings: Sequence[Recording]) -> list[Recording]:
-    """Recordings that continue one that is not among them."""
-    given = [one for one in recordings if "continues" in one.metadata]
-    return [one for one in given if not any(continues(one, other) for other in recordings if other is not one)]
-
-
-def continues(later: Recording, earlier: Recording) -> bool:
-    """Whether a recording continues another one."""
-    return _predecessor(later) == earlier.name
-
-
-def _predecessor(recording: Recording) -> str | None:
-    """The name of the recording that this one continues."""
-    return recording.metadata.get("continues")
-
-
 def at_full_rate(
     sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds
 ) -> list[Session]:
     """The same sessions without thinning, with the same cycles and held-out parts."""
     return _with_common_temperature_zero(
         [
-            _session(one.recording, one.index, mask, scale, 1, _History.of(one.conditions), thresholds, one)
+            _session(one.recording, one.index, mask, scale, 1, History.of(one.conditions), thresholds, one)
             for one, mask in zip(sessions, usable, strict=True)
         ]
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _History:
-    """What earlier recordings left to one that continues them: ``sums``, and their ``load`` (n,) every ``step_s``."""
-
-    sums: Mapping[str, float] = field(default_factory=dict)
-    load: Array = field(default_factory=lambda: np.zeros(0))
-    step_s: float = 1.0
-
-    @classmethod
-    def of(cls, conditions: Conditions) -> _History:
-        """The history that a session's conditions hold."""
-        return cls(conditions.before, conditions.earlier, conditions.step_s)
-
-    def load_every(self, step_s: float) -> Array:
-        """The load on another step; its last sample is one step before the recording that follows."""
-        if self.step_s == step_s or not self.load.size:
-            return self.load
-        count = max(round(self.load.size * self.step_s / step_s), 1)
-        ago_s = step_s * np.arange(count, 0, -1)
-        return np.asarray(np.interp(-ago_s, self.step_s * np.arange(-self.load.size, 0), self.load))
 
 
 def _session(
@@ -238,13 +175,13 @@ def _session(
     usable: Mask,
     scale: Scale,
     factor: int,
-    past: _History,
+    past: History,
     thresholds: Thresholds,
     template: Session | None = None,
 ) -> Session:
     """The session of one recording, thinned by ``factor``; cycles, held-out parts and noise those of a ``template``."""
     step_s = recording.sample_time_s
-    logged = _logged(
+    logged = logged_on_grid(
         recording,
         usable,
         scale,
@@ -258,12 +195,12 @@ def _session(
         if template is not None
         else _denoised_load(logged.load_n / scale.load_n, reading, step_s, thresholds)
     )
-    rest = _load_at_rest(denoised.load, reading, step_s, scale.unit, thresholds)
+    rest = load_at_rest(denoised.load, reading, step_s, scale.unit, thresholds)
     reach = largest_of_noise(denoised.load.size, thresholds) * denoised.raw_sd
     auxiliary = {name: smoothed(values, weights, factor) for name, values in logged.auxiliary.items()}
     conditions = Conditions(
         logged.time_s[::factor],
-        smoothed(_with_level_rests(denoised.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
+        smoothed(with_level_rests(denoised.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
         step_s * factor,
         denoised.remaining_sd * float(np.sqrt(np.sum(weights**2))),
         temperature_k=auxiliary.get("temperature_k"),
@@ -276,7 +213,7 @@ def _session(
     typical_coverage = float(np.median(coverage[coverage > 0.0])) if logged.usable.any() else 1.0
     load = conditions.load
     if template is None:
-        held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions, thresholds)
+        held_out, cycle = np.zeros(load.size, dtype=bool), cycles_of(conditions, thresholds)
     else:
         nearest = np.minimum(
             (np.arange(load.size) + template.thinned // 2) // template.thinned, template.cycle.size - 1
@@ -303,180 +240,8 @@ def _session(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Logged:
-    """A recording on an even grid, (n,) each, interpolated where samples are missing; ``reading`` in the scale's unit.
-
-    ``usable``: load and reading are present and sound. ``load_known``: the load is present. ``auxiliary``: temperature
-    and neighbour, where they were logged.
-    """
-
-    time_s: Array
-    load_n: Array
-    reading: Array
-    usable: Mask
-    load_known: Mask
-    auxiliary: dict[str, Array]
-
-
-def longest_step_s(recording: Recording, factor: int) -> float:
-    """The longest step in s that a fit can follow in a recording thinned by ``factor``: the width of its average."""
-    return (max(factor, LEAST_WINDOW) + 0.5) * recording.sample_time_s  # half a sample more, since stamps are rounded
-
-
-def _logged(recording: Recording, usable: Mask, scale: Scale, longest_s: float, thresholds: Thresholds) -> _Logged:
-    """The recording on an even grid; samples are usable up to ``longest_s`` apart."""
-    time_s, step_s = recording.time_s - recording.time_s[0], recording.sample_time_s
-    known = recording.load.present
-    good = usable & recording.sensor.present & known
-    reading = bridged(time_s, reading_in(recording, scale.unit), good)
-    load_n = bridged(time_s, recording.force_n, known)
-    auxiliary = _auxiliary_channels(recording, time_s, scale)
-    if recording.is_uniform:
-        return _Logged(time_s, load_n, reading, good, known, auxiliary)
-    even = np.asarray(step_s * np.arange(int(time_s[-1] / step_s) + 1), dtype=np.float64)
-    nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
-    is_near = np.abs(time_s[nearest] - even) < step_s
-    spacing = spacing_of(time_s, even, longest_s, thresholds)
-    good, known = (one[nearest] & is_near | spacing.followed(one) for one in (good, known))
-    return _Logged(
-        even,
-        np.interp(even, time_s, load_n),
-        np.interp(even, time_s, reading),
-        good,
-        known,
-        {name: np.interp(even, time_s, values) for name, values in auxiliary.items()},
-    )
-
-
-def _load_at_rest(load: Array, reading: Array, step_s: float, unit: Unit, thresholds: Thresholds) -> float:
-    """The load that the cell shows of an unloaded unit, as its tare: the lowest one, or the first if it begins so."""
-    low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
-    if unit.quantity == "pressure" and begins_unloaded(load, reading, step_s, thresholds):
-        return min(low, float(load[0]))
-    return min(low, thresholds.standing)
-
-
 def _denoised_load(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> DenoisedLoad:
     """The load (n,) without noise and with the reading's sampling jitter, both in shares of full scale."""
     raw_sd = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
     denoised, remaining_sd = without_noise(load, step_s, raw_sd, thresholds)
     return DenoisedLoad(with_sampling_jitter(denoised, reading, step_s, thresholds), raw_sd, remaining_sd)
-
-
-def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> bool:
-    """Whether a recording begins with a load (n,) at which its gauge (n,) reads almost nothing, so that it is a tare.
-
-    Not where load and reading both fall clearly below that later: then it began loaded, with a gauge zeroed there.
-    """
-    first = slice(0, max(1, round(thresholds.settled_s / step_s)))
-    begun, read = (float(one[first].mean()) for one in (load, reading))
-    if not (np.ptp(load[first]) < thresholds.standing and abs(read) < thresholds.same * abs(begun)):
-        return False
-    fall = min(level - float(np.quantile(one, 0.01)) for level, one in ((begun, load), (read, reading)))
-    return fall < thresholds.standing
-
-
-def _with_level_rests(load: Array, level: float, reach: float) -> Array:
-    """``load`` with each rest at its mean, up to ``reach``: an unloaded unit does not feel the load cell's noise."""
-    out = load.copy()
-    for first, last in zip(*runs_of(load < level), strict=True):
-        part = load[first:last]
-        middle = float(np.median(part))
-        still = np.abs(part - middle) < reach
-        if still.sum() > 10:
-            out[first:last][still] = part[still].mean()
-    return out
-
-
-def kernel(factor: int) -> Array:
-    """Weights of a Hann window over two thinned steps: a zero-phase average of sum one."""
-    if factor <= 1:
-        return np.ones(1)
-    window = np.hanning(2 * factor + 1)[1:-1]
-    return np.asarray(window / window.sum())
-
-
-def thinning_weights(factor: int, size: int) -> Array:
-    """The weights by which a recording of ``size`` samples is averaged before it is thinned by ``factor``.
-
-    At least so wide that noise of the load is smoothed alike in reading and simulation, whatever the thinning.
-    """
-    return kernel(min(max(factor, LEAST_WINDOW), size))
-
-
-def smoothed(signal: Array, weights: Array, factor: int) -> Array:
-    """(m,) ``signal`` (n,) averaged and thinned; ends are mirrored through their end points, which keeps the slope."""
-    half = weights.size // 2
-    if not half:
-        return np.array(signal[::factor], dtype=float)
-    return np.convolve(np.pad(signal, half, "reflect", reflect_type="odd"), weights, "valid")[::factor]
-
-
-def _auxiliary_channels(recording: Recording, time_s: Array, scale: Scale) -> dict[str, Array]:
-    """Temperature and neighbour (n,) in the units of conditions, where any sample is present."""
-    found = {}
-    temperature, neighbours = recording.channels.get("temperature"), neighbours_of(recording)
-    if temperature is not None and temperature.role == "auxiliary" and temperature.present.any():
-        found["temperature_k"] = bridged(time_s, temperature.si, temperature.present)
-    if neighbours:
-        share = neighbours[0].in_unit(scale.unit) / abs(scale.reading)
-        found["neighbour"] = bridged(time_s, share, neighbours[0].present)
-    return found
-
-
-def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
-    """The number of rises of the load in fitted recordings."""
-    return sum(_rises(session.conditions, thresholds) for session in fitted_of(sessions))
-
-
-def have_later_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
-    """Whether any fitted recording holds more than one load cycle."""
-    return any(load_cycles([session], thresholds) > 1 for session in sessions)
-
-
-def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
-    """The number of rises of the load; cached in the conditions."""
-
-    def count() -> Array:
-        load = conditions.load
-        return np.array([len(rises_of(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9)))])
-
-    return int(conditions.kept("rises", (thresholds.cycle,), count)[0])
-
-
-def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
-    """(n,) number of the load cycle; of equal parts of the time where there are too few cycles to hold some out."""
-    load = conditions.load
-    # A share of full scale, or of the record's own span where that is smaller.
-    threshold = thresholds.cycle * min(1.0, max(float(np.ptp(load)), 1e-9))
-    # A cycle begins at the foot of a rise, after a rest at its last low sample.
-    feet = [foot for foot, _ in rises_of(load, threshold)]
-    starts = []
-    for foot in feet:
-        level = load[foot] + 0.25 * threshold
-        end = foot
-        while end + 1 < load.size and load[end + 1] <= level:
-            end += 1
-        starts.append(end)
-    fewest = 2 * thresholds.held_out_every  # so that at least two are held out
-    if len(starts) < fewest:
-        parts = np.arange(load.size) * (2 * fewest) // load.size
-        return np.asarray(parts, dtype=np.intp)
-    cycle = np.zeros(load.size, dtype=np.intp)
-    cycle[starts[1:]] = 1
-    return np.cumsum(cycle)
-
-
-def _history_after(conditions: Conditions, thresholds: Thresholds) -> _History:
-    """The history that a session leaves to the one that continues it."""
-    load = conditions.load
-    before = conditions.before
-    sums = {
-        "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
-        "cycles": before.get("cycles", 0.0) + len(rises_of(load, thresholds.cycle)),
-        "way": before.get("way", 0.0) + float(half_way(conditions)[-1]),
-        "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
-        "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),
-    }
-    return _History(sums, np.concatenate([conditions.earlier, load]), conditions.step_s)

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._session import Session, smoothed, thinning_weights
+from smartshoe.diagnosis._averaging import smoothed, thinning_weights
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity import DataFault
 
 FINER = 4  # points of a spectrum in each bin: what is nearer than half of one, Newton's steps find

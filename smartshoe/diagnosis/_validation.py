@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, within_bounds
-from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
+from smartshoe.diagnosis._load_cycles import load_cycles
+from smartshoe.diagnosis._own_terms import residual_of
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 

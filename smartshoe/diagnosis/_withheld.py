@@ -21,10 +21,10 @@ from smartshoe.diagnosis._limits import (
     reason_of_another_kind,
     reason_tare_creeps,
 )
+from smartshoe.diagnosis._load_cycles import load_cycles
 from smartshoe.diagnosis._naming import Name, capped_at_half, names_of
 from smartshoe.diagnosis._prepared import Prepared
 from smartshoe.diagnosis._remembered import may_be_remembered
-from smartshoe.diagnosis._session import load_cycles
 from smartshoe.diagnosis._zero import Zero, creeping_tare
 
 

@@ -16,9 +16,10 @@ from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._baseline import has_extreme_arm
-from smartshoe.diagnosis._held_out import initial_memory_of, own_terms_of, residual_of
+from smartshoe.diagnosis._own_terms import initial_memory_of, own_terms_of, residual_of
+from smartshoe.diagnosis._rest import begins_unloaded
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._session import Session, all_fitted, begins_unloaded, fitted_of
+from smartshoe.diagnosis._session import Session, all_fitted, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, shift_of
 from smartshoe.models.extended import ExtendedModel

@@ -11,17 +11,19 @@ from scipy.signal import lfilter
 
 from smartshoe import Recording, dynamic_protocol
 from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._averaging import kernel, smoothed
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS
-from smartshoe.diagnosis._held_out import errors, gain, residual_of
+from smartshoe.diagnosis._held_out import errors, gain
 from smartshoe.diagnosis._lack_of_fit import repeating_structure, slow_structure
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._noise import effective_noise_sd
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
-from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR

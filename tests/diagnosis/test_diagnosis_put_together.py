@@ -50,7 +50,6 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     }  # fmt: skip
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert seen["zeros_of"][0][6] == ("wanders", STANDARD.hold_s)
-    assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_with_memory"][0][3:] == (True, STANDARD.material, "memory")
     assert seen["next_experiment"][1] == {"open_": False, "worse": False}  # as little is left as is explained
     assert seen["infer_with_gas_check"][0][4] is True

@@ -30,9 +30,9 @@ from smartshoe.diagnosis._gains_and_zeros import (
     with_own_terms,
     zero_changes_of,
 )
-from smartshoe.diagnosis._held_out import own_terms_of
 from smartshoe.diagnosis._jumps import MOMENTS, any_jumps, may_jump, moments_of, rounded_to
 from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._own_terms import own_terms_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Session, prepare

@@ -13,10 +13,11 @@ from scipy.ndimage import gaussian_filter1d
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._averaging import kernel, smoothed
 from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import jitter_s, with_sampling_jitter
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.integrity.thresholds import largest_of_noise
 from smartshoe.units import MILLIBAR, VOLT
 

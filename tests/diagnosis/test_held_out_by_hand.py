@@ -12,7 +12,8 @@ from scipy.stats import t as student
 from told_columns import MODEL, SCALE, STANDARD, past_columns, session_under, sessions_under, some_load
 
 from smartshoe.diagnosis._force import force_error
-from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, residual_of
+from smartshoe.diagnosis._held_out import Errors, errors, gain
+from smartshoe.diagnosis._own_terms import own_terms_of, residual_of
 from smartshoe.diagnosis._sensitivity import (
     rows_where,
 )

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from smartshoe.diagnosis import Thresholds, _validation
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, cancelling_effects, error_of

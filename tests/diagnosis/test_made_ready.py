@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from test_diagnosis_parts import MODEL
 
 from smartshoe import Recording
+from smartshoe.diagnosis._averaging import kernel, smoothed
+from smartshoe.diagnosis._continuation import without_predecessor
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._diagnose import _limit_missing_predecessor
 from smartshoe.diagnosis._jittered import jitter_s
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import available_effects, logged_channels, nuisance_precision
-from smartshoe.diagnosis._session import Session, at_full_rate, kernel, prepare, smoothed, without_predecessor
+from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.units import MILLIBAR
 

@@ -11,9 +11,9 @@ import pytest
 from told_columns import MODEL, STANDARD, STEP_S, session_under, some_load
 
 from smartshoe.diagnosis import _remembered
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._members import fit_with
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._remembered import may_be_remembered
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel

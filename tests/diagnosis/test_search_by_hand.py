@@ -14,7 +14,6 @@ from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, w
 
 from smartshoe.diagnosis import _members, _search, _state, _validation
 from smartshoe.diagnosis._evidence import Posterior
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._members import (
     Alternative,
     _confounded_law,
@@ -25,6 +24,7 @@ from smartshoe.diagnosis._members import (
     members_of,
     start_with,
 )
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import best_additions, best_step, is_admissible, search
 from smartshoe.diagnosis._validation import (
     LeftOut,

@@ -17,20 +17,14 @@ from scipy.stats import norm
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._averaging import kernel, smoothed
+from smartshoe.diagnosis._continuation import history_after
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
+from smartshoe.diagnosis._load_cycles import cycles_of
 from smartshoe.diagnosis._prepared import prepared
+from smartshoe.diagnosis._rest import begins_unloaded, with_level_rests
 from smartshoe.diagnosis._scale import Scale, at_lowest_load, fitted_lengths, full_scale, thinning
-from smartshoe.diagnosis._session import (
-    Session,
-    _cycles,
-    _history_after,
-    _with_level_rests,
-    at_full_rate,
-    begins_unloaded,
-    kernel,
-    prepare,
-    smoothed,
-)
+from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import examine
 from smartshoe.models.effects import Conditions
@@ -244,7 +238,7 @@ def test_each_rest_is_levelled_but_for_what_is_beyond_the_noise() -> None:
     rng = np.random.default_rng(3)
     load = np.concatenate([0.01 * rng.standard_normal(12), np.full(5, 0.8), 0.02 + 0.01 * rng.standard_normal(20)])
     load[30] = -0.2
-    found = _with_level_rests(load, 0.1, 0.03)
+    found = with_level_rests(load, 0.1, 0.03)
     first, last = load[:12], load[17:]
     near = np.abs(first - np.median(first)) < 0.03
     assert near.sum() > 10
@@ -255,8 +249,8 @@ def test_each_rest_is_levelled_but_for_what_is_beyond_the_noise() -> None:
     assert list(found[12:17]) == [0.8] * 5
     for count, is_levelled in ((10, False), (11, True)):
         few = np.concatenate([np.ones(3), np.resize([0.0, 0.01], count), np.ones(3)])
-        assert bool(np.ptp(_with_level_rests(few, 0.1, 0.5)[3:-3]) == 0.0) is is_levelled
-    assert list(_with_level_rests(np.array([0.1] * 20), 0.1, 0.5)) == [0.1] * 20
+        assert bool(np.ptp(with_level_rests(few, 0.1, 0.5)[3:-3]) == 0.0) is is_levelled
+    assert list(with_level_rests(np.array([0.1] * 20), 0.1, 0.5)) == [0.1] * 20
 
 
 def _conditions(load: Array, step_s: float = STEP_S, before: Any = None) -> Conditions:
@@ -265,50 +259,50 @@ def _conditions(load: Array, step_s: float = STEP_S, before: Any = None) -> Cond
 
 def test_a_cycle_begins_with_the_last_sample_of_the_rest_before_its_rise() -> None:
     rise = ((10, 0.0), (20, 1.0), (20, 0.0))
-    cycle = _cycles(_conditions(course(*rise * 6)), STANDARD)
+    cycle = cycles_of(_conditions(course(*rise * 6)), STANDARD)
     # Rests end at 10, 60, 110, ...; the foot is left once a quarter of what makes a cycle (0.02 of 0.05 a step) is.
     assert list(np.flatnonzero(np.diff(cycle)) + 1) == [60, 110, 160, 210, 260]
     assert (cycle[0], cycle[-1]) == (0, 5)
     slowly = ((10, 0.0), (200, 1.0), (20, 0.0))  # 0.005 a step: four steps more within a quarter of 0.08
-    later = _cycles(_conditions(course(*slowly * 6)), STANDARD)
+    later = cycles_of(_conditions(course(*slowly * 6)), STANDARD)
     assert list(np.flatnonzero(np.diff(later)) + 1) == [244 + 230 * k for k in range(5)]
     # A ripple of less than that is none; of a load that moves by little it is as much of its own span.
     rippled = course(*rise * 6) + 0.07 * np.resize([0.0, 1.0], 301)
-    assert _cycles(_conditions(rippled), STANDARD)[-1] == 5
-    small = _cycles(_conditions(0.7 + 0.05 * course(*rise * 6)), STANDARD)
+    assert cycles_of(_conditions(rippled), STANDARD)[-1] == 5
+    small = cycles_of(_conditions(0.7 + 0.05 * course(*rise * 6)), STANDARD)
     assert list(small) == list(cycle)
-    large = _cycles(_conditions(1.5 * course(*rise * 6)), STANDARD)
+    large = cycles_of(_conditions(1.5 * course(*rise * 6)), STANDARD)
     assert large[-1] == 5
     # Beyond full scale it is of full scale: a dip of 0.0975 is more than 0.08, though less than 0.08 of 1.5.
     dipped = ((10, 0.0), (20, 1.0), (5, 0.935), (5, 1.0), (20, 0.0))
-    assert _cycles(_conditions(1.5 * course(*dipped * 6)), STANDARD)[-1] == 11
+    assert cycles_of(_conditions(1.5 * course(*dipped * 6)), STANDARD)[-1] == 11
 
 
 @pytest.mark.parametrize(("rises", "count"), [(5, 12), (6, 6)])
 def test_fewer_than_six_cycles_make_twelve_parts_of_the_time(rises: int, count: int) -> None:
     load = course(*((10, 0.0), (20, 1.0), (20, 0.0)) * rises)
-    cycle = _cycles(_conditions(load), STANDARD)
+    cycle = cycles_of(_conditions(load), STANDARD)
     assert int(cycle[-1]) + 1 == count
     if count == 12:
         assert list(cycle) == [k * 12 // load.size for k in range(load.size)]
     six = replace(STANDARD, held_out_every=4)
-    assert int(_cycles(_conditions(load), six)[-1]) + 1 == 16
+    assert int(cycles_of(_conditions(load), six)[-1]) + 1 == 16
 
 
 def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
     load = course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
     dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in itertools.pairwise(load))
-    first = dict(_history_after(_conditions(load), STANDARD).sums)
+    first = dict(history_after(_conditions(load), STANDARD).sums)
     way = 0.5 * float(np.sum(np.abs(np.diff(load))))
     # A reversal shows in full but for twice the play's half width, which is no noise.
     assert first.pop("way") == pytest.approx(way, abs=4 * LEAST_DEAD_ZONE)
     assert first == pytest.approx({"largest_load": 0.9, "cycles": 2.0, "time_s": 90 * STEP_S, "dose": dose})
     before = {"largest_load": 0.95, "cycles": 7.0, "way": 3.0, "time_s": 30.0, "dose": 4.0}
-    later = dict(_history_after(_conditions(load, before=before), STANDARD).sums)
+    later = dict(history_after(_conditions(load, before=before), STANDARD).sums)
     assert later.pop("way") == pytest.approx(3.0 + way, abs=4 * LEAST_DEAD_ZONE)
     expected = {"largest_load": 0.95, "cycles": 9.0, "time_s": 30.0 + 90 * STEP_S, "dose": 4.0 + dose}
     assert later == pytest.approx(expected)
-    lower = _history_after(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD).sums
+    lower = history_after(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD).sums
     assert lower["largest_load"] == pytest.approx(0.9)
 
 

@@ -12,9 +12,10 @@ from test_diagnosis_parts import MODEL
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._averaging import kernel, smoothed
 from smartshoe.diagnosis._residual_structure import worst_place
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._session import kernel, prepare, smoothed
+from smartshoe.diagnosis._session import prepare
 from smartshoe.models.effects import Conditions
 from smartshoe.units import MILLIBAR
 

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Diagnosis
-from smartshoe.diagnosis._session import smoothed, thinning_weights
+from smartshoe.diagnosis._averaging import smoothed, thinning_weights
 from smartshoe.diagnosis._told_lines import as_thinned, lines_of, told_tones
 
 Array = NDArray[np.float64]

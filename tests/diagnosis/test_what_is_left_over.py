@@ -20,11 +20,12 @@ from smartshoe.diagnosis._force import (
     limit_calibration_off,
 )
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
-from smartshoe.diagnosis._held_out import Errors, errors, gain, own_terms_of, residual_of
+from smartshoe.diagnosis._held_out import Errors, errors, gain
 from smartshoe.diagnosis._lack_of_fit import PLACES, LackOfFit, repeating_structure, repeats, slow_structure
 from smartshoe.diagnosis._limits import limit_own_zeros
 from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._noise_kinds import noise_with_memory
+from smartshoe.diagnosis._own_terms import own_terms_of, residual_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, at_full_rate

@@ -29,9 +29,9 @@ from smartshoe.diagnosis._verdict import (
     untested_rms,
     verdict_of,
 )
-from smartshoe.diagnosis._zero import Zero, offsets
+from smartshoe.diagnosis._zero import offsets
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.models.effects import Conditions, effect, shift_of
+from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
@@ -310,18 +310,9 @@ def test_the_offset_that_readings_have_stands_in_the_model_named_or_not(runs: li
     scale = full_scale(runs, usable, Thresholds())
     sessions = prepare(runs, usable, [False] * 3, scale, [4], Thresholds())
     model = replace(PLAIN, gain=1.25)
-    plain = _with_offset(model, (), sessions, scale)
-    (part,) = plain.parts
+    (part,) = _with_offset(model, sessions, scale).parts
     assert part.name == "zero_offset"
     assert part.values[0] * model.gain == pytest.approx(float(np.mean(offsets(sessions, model))))
-    named = Zero(shift_of("reading"), 0.05, 0.001, 0.05)
-    (only,) = _with_offset(model, (named,), sessions, scale).parts  # at rest there may be more of it than under load
-    assert only.values[0] * model.gain == pytest.approx(float(np.mean(offsets(sessions, model))))
-    tared = Zero(shift_of("load"), -0.02, 0.001, 0.02)
-    both = {part.name: float(part.values[0]) for part in _with_offset(model, (tared,), sessions, scale).parts}
-    assert both["load_cell_tare"] == -0.02
-    with_tare = model.with_part(shift_of("load"), np.array([-0.02]))
-    assert both["zero_offset"] * model.gain == pytest.approx(float(np.mean(offsets(sessions, with_tare))))
 
 
 def _after_a_hold(period_s: float, share: float, seed: int) -> Recording:

@@ -15,8 +15,8 @@ from scipy.stats import t as student
 from smartshoe.diagnosis import Thresholds, diagnose
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of
-from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._limits import limit_wall_ratio
+from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._scale import Scale, full_scale
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
@@ -137,6 +137,25 @@ def test_a_tare_is_told_of_any_sensor_where_a_command_says_that_nothing_presses(
     assert [one.effect.name for one in found.values()] == ["load_cell_tare"] * bool(tare)
     if tare:
         assert found["load_cell_tare"].value == pytest.approx(-tare, rel=0.1)
+
+
+def test_a_calibration_of_a_bent_unit_beside_a_tare_gives_the_force_that_it_states() -> None:
+    """The curve is that over the load as logged: a tare before it would give other readings, and another force."""
+    bent = MODEL.with_part("wall_hardening", np.array([0.15, 0.0]))
+    runs = []
+    for seed in range(4):
+        noise = 2e-4 * np.random.default_rng(seed).standard_normal(TIME_S.size)
+        reading = FULL_MBAR * (bent.simulate(Conditions(TIME_S, (0.7 + 0.1 * seed) * PRESSED, STEP_S)) + noise)
+        load_n = FULL_N * ((0.7 + 0.1 * seed) * PRESSED - 0.03)
+        runs.append(Recording.from_arrays(time_s=TIME_S, force_n=load_n, name=f"run_{seed}", pressure_mbar=reading))
+    found = diagnose(runs[:3], hold_out=runs[3:])
+    assert "load_cell_tare" in [cause.name for cause in found.causes]
+    force_n = found.calibration(unit="tared").compensator(1.0 / STEP_S).apply(runs[3])
+    assert found.extended is not None
+    assert float(np.sqrt(np.mean((force_n - runs[3].force_n) ** 2))) < 1.3 * found.extended.force_rmse_n
+    assert found.model is not None
+    simulated = found.model.reading(Conditions(TIME_S, runs[3].force_n / found.full_scale_load_n, STEP_S))
+    assert float(np.sqrt(np.mean((simulated - runs[3].sensor.values) ** 2))) < 1e-3 * FULL_MBAR
 
 
 @pytest.mark.parametrize(("tare", "way"), [(0.03, "24 N more"), (-0.02, "16 N less")])

@@ -17,7 +17,7 @@ from told_noise import kinds_of_noise
 
 from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock
-from smartshoe.diagnosis._held_out import initial_memory_of
+from smartshoe.diagnosis._own_terms import initial_memory_of
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._zero import _drift_at_rest, _zero_by_model, first_rests, offsets, sd_of_a_mean, zeros_of
