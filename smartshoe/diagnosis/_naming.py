@@ -127,7 +127,8 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
     # A law that follows less than half of it is no equivalent.
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
     kin = tuple(name for name in others if name not in ruled_out)
-    return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
+    # One half at most: where all others are ruled out, it may still be a law that the catalogue does not have.
+    return Name(one, nearest, kind, 1.0 / (1.0 + max(len(kin), 1)), kin, True, is_sure)
 
 
 def _with_kin(name: Name) -> Name:

@@ -137,6 +137,10 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert {name.effect.name, *name.equivalents} == family - {"gas_compression", "wall_hardening"}
     assert name.kind_probability == probability_of_kind(name.member, 0.0, STANDARD) > confidence_of(name, STANDARD)
     assert name.law_probability == pytest.approx(1.0 / (len(family) - 2))
+    # Where all others follow less than half of it, no law is sure all the same: it may be none of the catalogue's.
+    far = tuple((one, 900.0) for one in family - {"contact_area"})
+    lone = only(names_of([member(block, laws=(("contact_area", 9.0), *far), fall=47.0)], 0.0, STANDARD))
+    assert (lone.kind_only, lone.equivalents, lone.law_probability) == (True, (), 0.5)
 
 
 @pytest.mark.parametrize(("of", "law"), [("static_curve", "dead_band"), ("zero", "permanent_set")])

@@ -8,7 +8,7 @@ from smartshoe.models.effects.exposure import by
 
 
 class CrossTalk(Effect):
-    """+ chi times the neighbour's pressure, a share of its largest; inert where no neighbour was logged.
+    """+ chi times the neighbour's pressure, a share of this unit's full scale; inert where no neighbour was logged.
 
     It has no streaming inverse: a unit's filter does not see its neighbour.
     """
@@ -16,7 +16,9 @@ class CrossTalk(Effect):
     name, family, stage, place = "cross_talk", "cross_talk", "sensor", "sensor"
     says = "the reading follows a neighbouring unit's pressure, also while its own load rests"
     parameters = (
-        EffectParameter("coupling", "FS_reading", "reading at the neighbour's largest pressure", 0.0, -0.5, 0.5, 0.01),
+        EffectParameter(
+            "coupling", "FS_reading", "reading while the neighbour reads this unit's full scale", 0.0, -0.5, 0.5, 0.01
+        ),
     )
     needs = frozenset({"neighbour"})
     separated_by = {
