@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._experiments import EXPERIMENTS, sessions_on
+from smartshoe.diagnosis._experiments import sessions_on
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, evaluated, fit, rows_of, within_bounds
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
+
+
+def predicted_session(unit: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:
+    """The prepared recording that ``unit`` is predicted to give under the protocol."""
+    (session,), _ = sessions_on(unit, [protocol], unit.full_scale_load_n, sample_time_s, thresholds)
+    return session
+
+
+Predict = Callable[[ExtendedModel, Protocol, float, Thresholds], Session]  # `predicted_session`, or one that keeps them
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +59,7 @@ class Contest:
         sample_time_s: float,
         min_margin_gain: float = -math.inf,
         min_log_odds: float = -math.inf,
+        predict: Predict = predicted_session,
     ) -> Contest | None:
         """The contest once the protocol is run, logged every ``sample_time_s``, on a unit with the cause as fitted.
 
@@ -58,7 +69,7 @@ class Contest:
         misses.
         """
         known, model = self.cause.likelihood, self.cause.model
-        session = _predicted_session(model, protocol, sample_time_s, known.thresholds)
+        session = predict(model, protocol, sample_time_s, known.thresholds)
         predicted_miss = Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model)
         if predicted_miss <= min_margin_gain or self._log_odds_of(self.margin + predicted_miss) <= min_log_odds:
             return None
@@ -88,12 +99,3 @@ class Contest:
         """``model`` within its bounds, and its residuals and slopes over this data, which serve every protocol."""
         start = within_bounds(model)
         return start, [rows_of(start, one) for one in self.cause.likelihood.sessions]
-
-
-@lru_cache(maxsize=len(EXPERIMENTS))
-def _predicted_session(
-    unit: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds
-) -> Session:
-    """The prepared recording that the unit is predicted to give; cached, since each doubtful cause asks for it."""
-    (session,), _ = sessions_on(unit, [protocol], unit.full_scale_load_n, sample_time_s, thresholds)
-    return session

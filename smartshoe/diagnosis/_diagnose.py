@@ -36,6 +36,8 @@ def diagnose(
 ) -> Diagnosis:
     """What the baseline simulation of ``recordings`` gets wrong, why, and what mending it gains.
 
+    A diagnosis that the data cannot support comes back with the verdict "refused" and the reason in ``limits``.
+
     Parameters
     ----------
     recordings
@@ -54,8 +56,13 @@ def diagnose(
     Raises
     ------
     UsageError
-        Where no recording is given, of recordings of several units, and of numbers to decide by that are none. A
-        diagnosis that the data cannot support comes back with the verdict "refused" and the reason in ``limits``.
+        Where no recording is given, of recordings of several units, and of numbers to decide by that are none.
+    InputError
+        Of a file or a DataFrame that cannot be read, and of an ``effective_area_m2`` that is no positive number.
+    UnitError
+        Of readings of two quantities.
+    NotIdentifiableError
+        Where load or reading leaves zero in a few samples only, too few for a full scale.
     """
     fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
     if not fitted:

@@ -112,7 +112,8 @@ def gauss_markov_of(
     if not any(one.residual.any() for one in blocks):
         return None
     complete_count = sum(int(one.complete.sum()) for one in blocks)
-    lags = round(thresholds.lasting_s / thresholds.sensor_lag_s)
+    step_s = float(np.median([one.step_s for one in blocks]))
+    lags = max(round(thresholds.lasting_s / step_s), 1)
     covariance = np.sum([_covariance(one.residual, lags) for one in blocks], axis=0) / complete_count
     weights = _autoregression(covariance, complete_count)
     good = [_past_is_known(one, weights.size) for one in blocks]
@@ -136,7 +137,7 @@ def gauss_markov_of(
     load_z = max(abs(_correlation(one, np.minimum(square, largest**2))) for one in drives) * np.sqrt(count)
     level = np.concatenate([one.residual[one.complete] for one in blocks])
     excess_kurtosis = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
-    tau_s = _memory_s(weights, lags, float(np.median([one.step_s for one in blocks])))
+    tau_s = _memory_s(weights, lags, step_s)
     tests = spectrum_statistic, float(kurtosis), float(load_z)
     predicted_variance = max(float(covariance[0]) - innovation_variance, 0.0)
     one, two = (_lagged(blocks, lag, thresholds) / complete_count for lag in (1, 2))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
-from smartshoe.diagnosis._contest import Contest
+from smartshoe.diagnosis._contest import Contest, Predict, predicted_session
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import EXPERIMENTS, paced
 from smartshoe.diagnosis._gains_and_zeros import changes_of, time_of
@@ -66,8 +67,9 @@ def next_experiment(
         return NextExperiment(pair, "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.part is not None]
     proposed: list[NextExperiment] = []
+    predict = lru_cache(maxsize=len(EXPERIMENTS))(predicted_session)  # each doubtful cause asks for the same ones
     for cause in sorted(doubtful, key=lambda one: -one.size):
-        proposed.append(_separating_experiment(found, cause, sessions, excitation.thresholds))
+        proposed.append(_separating_experiment(found, cause, sessions, excitation.thresholds, predict))
         if proposed[-1].protocol:
             return _with_its_loads(proposed[-1], sessions, excitation.thresholds)
     if by_channel := [one for one in proposed if one.channel]:
@@ -121,7 +123,7 @@ def _fastest_n_per_s(recording: Recording) -> float:
 
 
 def _separating_experiment(
-    found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds
+    found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds, predict: Predict
 ) -> NextExperiment:
     """The shortest protocol that rules a cause's nearest equivalent out, or tells clearly more than this data.
 
@@ -139,7 +141,7 @@ def _separating_experiment(
     min_log_odds = min(thresholds.clear * now.log_odds, _ruled_out_at(thresholds))
     predicted: list[tuple[Protocol, Contest]] = []
     for protocol in sorted(left, key=lambda one: one.duration_s):
-        then = now.after_experiment(protocol, least_s, no_name, min_log_odds)
+        then = now.after_experiment(protocol, least_s, no_name, min_log_odds, predict)
         if then is not None:
             predicted.append((protocol, then))
             if _rules_out(then, thresholds):

@@ -37,22 +37,28 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     unit = scale.unit.symbol
     to_physical = scale.reading / scale.load_n
     within = [_gain(load, reading, thresholds.follows) for load, reading in pairs]
+    gains = [gain for gain in within if gain is not None]
     is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in pairs)
     if is_narrow and all(gain is not None for gain in within):
-        gain = float(np.median([gain for gain in within if gain is not None]))
+        gain = float(np.median(gains)) or gains[0]  # between two that are opposite there is none
         through_zero = float(np.median([reading.mean() / load.mean() for load, reading in pairs]))
         lowest = min(range(len(pairs)), key=lambda k: float(pairs[k][0].min()))
         low, high = (float(of(pairs[lowest][0])) * scale.load_n for of in (np.min, np.max))
         is_gauge = scale.unit.quantity == "pressure"  # for others zero is a convention
-        trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
+        trap = is_gauge and not 1.0 / thresholds.clear < through_zero / gain < thresholds.clear
+        # Where the mean was taken out its ratio to the load is noise.
+        over_load = (
+            "where the mean reading is next to nothing"
+            if abs(through_zero) <= thresholds.standing * abs(gain)
+            else f"where reading over load is {_gain_in_words(through_zero * to_physical, unit)}"
+        )
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
-            f" {fitted[lowest].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
-            f" ({1.0 / (gain * to_physical):.4g} N/{unit})"
+            f" {fitted[lowest].recording.name}), in which the reading moves by"
+            f" {_gain_in_words(gain * to_physical, unit)}"
             + (
-                f", where reading over load is {through_zero * to_physical:.3g} {unit}/N"
-                f" ({1.0 / (through_zero * to_physical):.4g} N/{unit}): load and reading may both follow a third thing"
-                " (a reversal, a regulator), so that this gain is none to calibrate by, and no cause is named"
+                f", {over_load}: load and reading may both follow a third thing (a reversal, a regulator), so that this"
+                " gain is none to calibrate by, and no cause is named"
                 if trap
                 else ": what lies below is extrapolated"
             )
@@ -73,7 +79,6 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     said += _limit_unlike_gain(fitted, thresholds)
     between = _gain_between_files(pairs, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
-        gains = [gain for gain in within if gain is not None]
         # Somewhere on its way a curve is as steep as its chord.
         over = [abs(gain / between) for gain in gains]
         if min(over) >= 1.0 + thresholds.same or max(over) * (1.0 + thresholds.same) <= 1.0:
@@ -84,6 +89,11 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 " zero of reading or load is another in each file, or the files are not of one unit"
             )
     return Ranges(tuple(said), trap)
+
+
+def _gain_in_words(gain: float, unit: str) -> str:
+    """A gain, and the load that moves the reading by one unit."""
+    return f"{gain:.3g} {unit}/N ({1.0 / gain:.4g} N/{unit})"
 
 
 def _has_enough(seen: Mask) -> bool:

@@ -187,6 +187,7 @@ class Thresholds:
         "share of the span",
         "movement up to which a load, or a reading that is lost, stands still",
         "judgement",
+        least=1e-4,  # a static curve has a bin for each such share
         most=0.5,
     )
     echo_s: float = threshold(

@@ -413,3 +413,9 @@ def test_only_a_shape_within_its_bounds_is_not_stretched() -> None:
                 values[j] = 0.5 * (parameter.lower + parameter.upper)
         values[k] = value
         assert _is_stretched(MODEL.with_part(law, values), law) is stretched
+
+
+@pytest.mark.parametrize("tau_s", [0.3, 3.0, 30.0])
+def test_of_one_usual_time_constant_every_arm_is_beyond(tau_s: float) -> None:
+    one = replace(STANDARD, memory_s=(3.0,))
+    assert has_arm_beyond_memory(replace(MODEL, relaxation_rate_per_s=1.0 / tau_s), one)

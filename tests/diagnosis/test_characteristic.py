@@ -183,6 +183,14 @@ def test_friction_is_told_through_noise_and_a_zero_that_drifts(
     assert "its direction" in str(said)
 
 
+@pytest.mark.parametrize("late_s", [0.0, 60.0, 3600.0])
+def test_friction_is_told_also_where_the_last_sample_comes_late(late_s: float) -> None:
+    time_s = TIME_S.copy()
+    time_s[-1] += late_s
+    made = Recording.from_arrays(time_s=time_s, force_n=TRIANGLE, pressure_mbar=5.0 * _rising())
+    assert "its direction" in str(friction_of(made, STANDARD))
+
+
 def test_what_wanders_is_seldom_told_as_friction() -> None:
     """The branches of a random walk explain some of it over two load cycles, and are others in the second."""
     slow = 100.0 * (2.0 * np.abs(2.0 * (TIME_S / 30.0 % 1.0) - 1.0) - 1.0)

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis.decay import Decay, decay_of
+from smartshoe.errors import UsageError
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -254,3 +256,16 @@ def test_noise_as_loud_as_the_fall_is_no_error(seed: int, noise_mbar: float) -> 
     time_s = 0.1 * np.arange(500)
     decay = decay_of(Recording.from_arrays(time_s=time_s, pressure_mbar=90.0 + 10.0 * np.exp(-time_s / 5.0) + noise))
     assert decay is None or (decay.tau_s > 0.0 and decay.ci95_s[0] <= decay.tau_s <= decay.ci95_s[1])
+
+
+@pytest.mark.parametrize("bins", [10, 24, 80, 800, 4000])
+def test_a_decay_is_known_by_however_few_points_a_lag_is_looked_for(bins: int) -> None:
+    decay = decay_of(_recording(100.0 * np.exp(-TIME_S / 20.0)), Thresholds(bins=bins))
+    assert decay is not None
+    assert decay.tau_s == pytest.approx(20.0, rel=0.02)
+
+
+@pytest.mark.parametrize("given_", [0.02, 0.0, "0.02", {}])
+def test_a_decay_is_decided_by_thresholds_alone(given_: object) -> None:
+    with pytest.raises(UsageError, match=f"thresholds is of type {type(given_).__name__}: give Thresholds"):
+        decay_of(_recording(100.0 * np.exp(-TIME_S / 20.0)), given_)  # type: ignore[arg-type]

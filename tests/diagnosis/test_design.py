@@ -13,7 +13,7 @@ from smartshoe import dynamic_protocol, static_protocol
 from smartshoe.cli import run_command
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._experiments import EXPERIMENTS
-from smartshoe.diagnosis.design import Design, design
+from smartshoe.diagnosis.design import Design, design, too_short_of
 from smartshoe.errors import UsageError
 from smartshoe.protocol import Protocol, Segment
 
@@ -295,3 +295,13 @@ def test_the_command_refuses_options_that_a_design_does_not_heed(
 ) -> None:
     assert run_command(["diagnose", "--design", str(root / "scenarios" / "calibration.toml"), *more]) == 2
     assert f"--design takes no {more[0]}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("given", [0.02, 0, {}])
+def test_a_design_is_decided_by_thresholds_alone(given: object) -> None:
+    press = dynamic_protocol((400,))
+    said = f"thresholds is of type {type(given).__name__}: give Thresholds"
+    with pytest.raises(UsageError, match=said):
+        design([press], thresholds=given)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=said):
+        too_short_of(press, 100.0, given)  # type: ignore[arg-type]

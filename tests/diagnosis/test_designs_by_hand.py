@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import weakref
 from dataclasses import replace
 from importlib import import_module
 from types import SimpleNamespace
@@ -14,7 +16,7 @@ from courses import course, pressed, triangles
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, _next_experiment
-from smartshoe.diagnosis._contest import Contest
+from smartshoe.diagnosis._contest import Contest, Predict
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import run_on
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
@@ -256,8 +258,9 @@ class _Foretold:
         self.asked: list[str] = []
 
     def after_experiment(
-        self, protocol: Any, sample_time_s: float, least: float, min_log_odds: float
+        self, protocol: Any, sample_time_s: float, least: float, min_log_odds: float, predict: Predict
     ) -> _Foretold | None:
+        predict(MODEL, protocol, sample_time_s, STANDARD)
         assert sample_time_s == pytest.approx(0.005)  # of the recording that was logged most quickly
         assert min_log_odds == min(2.0 * self.log_odds, ENDS)  # what comes to no more is never proposed
         self.asked.append(protocol.name)
@@ -285,12 +288,14 @@ def _next(
     channel: str | None = None,
     rate_n_per_s: float = 320.0,
     present: frozenset[Any] = frozenset(),
+    predicted: Any = lambda *given: None,
 ) -> Any:
     monkeypatch.setattr(_next_experiment, "_contest", lambda found, cause, rival: contests[cause.name])
     monkeypatch.setattr(_next_experiment, "_channel", lambda name, rival, sessions: channel)
     lasting = {"long_hold": 600.0, "steps": 50.0, "rates": 200.0}
     made = {name: (lambda peak_n, name=name: _pressing(name, lasting[name], rate_n_per_s)) for name in lasting}
     monkeypatch.setattr(_next_experiment, "EXPERIMENTS", made)
+    monkeypatch.setattr(_next_experiment, "predicted_session", predicted)
     unseen = NextExperiment((), "unseen", None, "unseen", None, _pressing("unseen", 50.0, rate_n_per_s))
     monkeypatch.setattr(_next_experiment, "_protocol_for_missing_excitation", lambda *given: unseen)
     found: Any = SimpleNamespace(
@@ -384,6 +389,27 @@ def test_what_no_protocol_tells_better_asks_for_a_channel_or_for_nothing(monkeyp
     contests = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (0.9, 90.0)})}
     assert _next(monkeypatch, [_cause(*LEAK)], contests).protocol == "steps"
     assert _next(monkeypatch, [_cause(*LEAK)], contests, channel="temperature").protocol is None
+
+
+def test_what_a_unit_would_read_is_simulated_once_for_all_its_causes_and_kept_no_longer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+    kept: weakref.WeakSet[Any] = weakref.WeakSet()
+
+    def predicted(unit: Any, protocol: Any, *given: Any) -> Any:
+        asked.append(protocol.name)
+        session = type("Simulated", (), {})()
+        kept.add(session)
+        return session
+
+    causes = [_cause(*LEAK), _cause("dead_band", 0.01, ("contact_area",))]
+    contests = {"linear_leak": _Foretold(0.1, 5.0), "dead_band": _Foretold(0.1, 5.0)}
+    for again in (1, 2):
+        _next(monkeypatch, causes, contests, predicted=predicted)
+        assert asked == ["steps", "rates", "long_hold"] * again
+        gc.collect()
+        assert not kept
 
 
 def test_of_several_doubtful_causes_the_largest_that_a_protocol_tells(monkeypatch: pytest.MonkeyPatch) -> None:

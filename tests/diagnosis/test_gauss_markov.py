@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from test_diagnosis_parts import RATE_HZ, recording, sessions_of
 
-from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._gauss_markov import gauss_markov_of
+from smartshoe.diagnosis import Thresholds, _gauss_markov
+from smartshoe.diagnosis._gauss_markov import _covariance, gauss_markov_of
 from smartshoe.diagnosis._jittered import jitter_s, with_sampling_jitter
 from smartshoe.diagnosis._residual_structure import residual_structure
 from smartshoe.diagnosis._session import Session
@@ -104,6 +106,29 @@ def test_a_mean_of_slow_noise_is_known_by_how_often_it_forgets(sessions, tau_s):
     means = slow.reshape(-1, round(20.0 * tau_s / step_s)).mean(axis=1)
     assert found.sd_of_mean(20.0 * tau_s) == pytest.approx(float(means.std()), rel=0.1)
     assert found.sd_of_mean(0.01 * tau_s) == found.rms
+
+
+@pytest.mark.parametrize("step_s", [0.02, 0.1, 0.25, 1.0])
+@pytest.mark.parametrize("echo_s", [1e-9, 0.1])
+def test_a_memory_is_looked_for_over_what_lasts_at_any_pace(
+    monkeypatch: pytest.MonkeyPatch, step_s: float, echo_s: float
+) -> None:
+    """Six seconds, of blocks of a sensor's lag, or of a sample where that is longer."""
+    asked = []
+    monkeypatch.setattr(_gauss_markov, "_covariance", lambda *given: asked.append(given[1]) or _covariance(*given))
+    (session,) = sessions_of(recording(seed=1))[0]
+    conditions = replace(session.conditions, step_s=step_s)
+    found = gauss_markov_of(
+        [replace(session, conditions=conditions)], noises([session], 1), replace(STANDARD, echo_s=echo_s)
+    )
+    assert found is not None
+    assert asked == [round(6.0 / max(step_s, 2.0 * echo_s))]
+
+
+def test_where_nothing_lasts_one_block_is_remembered(sessions: list[Session]) -> None:
+    found = gauss_markov_of(sessions, noises(sessions, 1, 1.0, 0.01), replace(STANDARD, hold_s=1e-9))
+    assert found is not None
+    assert not found.is_noise
 
 
 def averaged(rng: np.random.Generator, size: int, step_s: float, length_s: float) -> np.ndarray:

@@ -57,6 +57,36 @@ def test_a_line_that_misses_zero_by_far_is_a_trap() -> None:
     assert "none to calibrate by" in found.says[0]
 
 
+@pytest.mark.parametrize(
+    ("share", "is_said"), [(0.0, False), (1e-12, False), (0.019, False), (0.021, True), (-0.3, True)]
+)
+def test_of_a_reading_whose_mean_was_taken_out_no_ratio_to_its_load_is_said(share: float, is_said: bool) -> None:
+    """Within two per cent of what the load times the gain would be."""
+    load = 600.0 + 200.0 * TRIANGLE
+    moved = GAIN_MBAR_PER_N * (load - load.mean())
+    found = _ranges((load, moved + share * GAIN_MBAR_PER_N * load.mean()))
+    assert found.is_trap
+    assert ("reading over load is" in found.says[0]) is is_said
+    assert ("the mean reading is next to nothing: load and reading" in found.says[0]) is not is_said
+    assert "the reading moves by 0.25 mbar/N (4 N/mbar)" in found.says[0]
+
+
+def test_no_gain_is_divided_by_where_there_is_none() -> None:
+    """Of a mean of exactly nothing, and between files that go opposite ways."""
+    ends = np.repeat([600.0, 800.0], TIME_S.size // 2)
+    falls = GAIN_MBAR_PER_N * (ends - 700.0)
+    recordings = [
+        Recording.from_arrays(time_s=TIME_S, force_n=ends, pressure_mbar=way * falls, name=f"run_{way:g}")
+        for way in (1.0, -1.0)
+    ]
+    for given in (recordings[:1], recordings):
+        usable = [np.ones(TIME_S.size, dtype=bool) for _ in given]
+        scale = full_scale(given, usable, Thresholds())
+        found = ranges_of(prepare(given, usable, None, scale, [1], Thresholds()), scale, Thresholds())
+        assert found.is_trap
+        assert "the mean reading is next to nothing" in found.says[0]
+
+
 def test_no_line_goes_through_the_zero_of_a_sensor_whose_zero_is_a_convention() -> None:
     load = 600.0 + 200.0 * TRIANGLE
     found = _ranges((load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)), unit="mv")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis._diagnose import _spread
-from smartshoe.errors import UnitError, UsageError
+from smartshoe.errors import InputError, NotIdentifiableError, UnitError, UsageError
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import find_unit
@@ -201,3 +201,36 @@ def test_of_very_many_recordings_those_that_are_used_do_not_hang_on_their_order(
     assert found.verdict == "refused"
     assert "are used" not in found.says
     assert found.limits[-1].startswith("of 6 recordings to fit 3 are used")
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_copy_of_what_is_used_only_where_its_reading_was_logged_is_left_out_too(every: int) -> None:
+    half = GOOD.with_channel(replace(GOOD.sensor, missing=np.arange(len(GOOD)) % every > 0))
+    found = diagnose([half, replace(half, name="copy")])
+    assert [(trace.name, trace.time_s.size) for trace in found.traces] == [("good", len(GOOD) // every)]
+    assert sum(TWICE in limit for limit in found.limits) == 1
+
+
+@pytest.mark.parametrize("why", ["reference load", "constant"])
+def test_of_very_many_recordings_one_of_no_use_is_left_out_and_said_once(
+    why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other sentences begin with how many are used."""
+    monkeypatch.setattr("smartshoe.diagnosis._diagnose.MOST_RECORDINGS", 2)
+    found = diagnose([BAD[why], GOOD.taken(slice(0, 2000)), GOOD.taken(slice(0, 1500))])
+    (said,) = found.left_out
+    assert why in said
+    assert found.limits == (f"left out: {said}", *found.limits_of_the_rest)
+    assert found.limits_of_the_rest[0].startswith("of 3 recordings to fit 2 are used")
+
+
+def test_what_is_no_number_of_a_unit_or_too_little_for_a_full_scale_is_refused_by_name() -> None:
+    for area in ("wide", "0", "-0.001"):
+        declared = replace(GOOD, metadata={"effective_area_m2": area})
+        with pytest.raises(InputError, match=f"good: effective_area_m2 is '{area}': give a positive number in m2"):
+            diagnose(declared)
+    pressed = np.zeros(len(GOOD))
+    pressed[1500:1502] = FULL_N
+    once = Recording.from_arrays(time_s=GOOD.time_s, force_n=pressed, pressure_mbar=0.1 * pressed, name="once")
+    with pytest.raises(NotIdentifiableError, match="once: load or reading never leaves zero"):
+        diagnose(once)

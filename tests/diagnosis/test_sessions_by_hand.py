@@ -20,7 +20,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._averaging import kernel, smoothed
 from smartshoe.diagnosis._continuation import history_after
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
-from smartshoe.diagnosis._load_cycles import cycles_of
+from smartshoe.diagnosis._load_cycles import cycles_of, have_later_cycles, load_cycles
 from smartshoe.diagnosis._prepared import prepared
 from smartshoe.diagnosis._rest import begins_unloaded, with_level_rests
 from smartshoe.diagnosis._scale import Scale, at_lowest_load, fitted_lengths, full_scale, thinning
@@ -328,6 +328,15 @@ def _sessions(*runs: Recording, factor: int = 1, usable: Any = None, held: Any =
 
 
 PRESSES = course(*((40, 0.0), (60, 1.0), (60, 0.0)) * 7)
+
+
+@pytest.mark.parametrize(("rest", "cycles"), [(0.0, 2), (0.01, 1), (0.07, 1)])
+def test_a_bump_after_a_press_is_a_load_cycle_where_it_rises_and_falls(rest: float, cycles: int) -> None:
+    """Up by 0.085 and down by as much; not where it comes down by less than 0.08."""
+    sessions = _sessions(_run(course((40, 0.0), (120, 1.0), (120, 0.0), (100, 0.0), (40, 0.085), (40, rest))))
+    assert load_cycles(sessions, STANDARD) == cycles
+    assert have_later_cycles(sessions, STANDARD) is (cycles > 1)
+    assert history_after(sessions[0].conditions, STANDARD).sums["cycles"] == cycles
 
 
 def test_of_two_channels_in_the_readings_unit_the_first_is_the_neighbour_but_no_reference() -> None:

@@ -20,6 +20,7 @@ from smartshoe.diagnosis._aligned import _on_one_clock
 from smartshoe.diagnosis._own_terms import initial_memory_of
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import prepare
 from smartshoe.diagnosis._zero import _drift_at_rest, _zero_by_model, first_rests, offsets, sd_of_a_mean, zeros_of
 from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.effects.effect import EffectParameter
@@ -358,6 +359,18 @@ def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
     assert first_rests([thin], MODEL, STANDARD).shape == (1, 6)
     command[0] = 500.0
     assert first_rests([thin], MODEL, STANDARD).size == 0
+
+
+@pytest.mark.parametrize("slow_step_s", [0.005, 0.01, 0.03])
+def test_a_command_is_read_by_the_clock_also_of_a_log_that_begins_slower_or_faster(slow_step_s: float) -> None:
+    """Both the rest of a second and the tare in it, of 120 N, are the log's whatever its pace."""
+    time_s = np.concatenate([np.arange(0.0, 3.0, slow_step_s), np.arange(3.0, 30.0, 0.01)])
+    asked = np.interp(time_s, [1.0, 3.0, 5.0, 8.0, 14.0, 20.0, 30.0], [0.0, 400.0, 400.0, 0.0, 0.0, 800.0, 0.0])
+    run = Recording.from_arrays(time_s=time_s, force_n=120.0 + asked, pressure_mbar=0.14 * asked, command_n=asked)
+    scale = Scale(920.0, 112.0, MILLIBAR)
+    sessions = prepare([run], [np.ones(time_s.size, dtype=bool)], None, scale, [1], STANDARD)
+    (rest,) = first_rests(sessions, MODEL, STANDARD)
+    assert rest[:2] == pytest.approx([120.0 / 920.0, 0.0], abs=1e-3)
 
 
 def test_a_first_rest_at_a_tare_ends_where_the_load_leaves_it() -> None:

@@ -115,3 +115,11 @@ def test_holds_and_peaks_on_a_grid_are_no_rail(seed: int, step_mbar: float) -> N
         for reading in (solid(load, lag, 0, 0.3, seed, 0.0), rubbed):
             coarse = step_mbar * np.round(reading / step_mbar)
             assert "saturation" not in kinds(logged(load, coarse, 0.5))
+
+
+@pytest.mark.parametrize("count", [2000, 16000])
+def test_what_follows_no_load_that_alternates_from_sample_to_sample_is_told_so(count: int) -> None:
+    """Averaged over pairs, as in a long log, such a load stands still."""
+    load = np.where(np.arange(count) % 2 == 0, 100.0, 700.0)
+    noise = np.random.default_rng(1).standard_normal(count)
+    assert "does_not_follow_load" in kinds(logged(load, noise, 0.01))

@@ -138,3 +138,30 @@ def test_a_short_recording_of_a_staircase_is_not_refused() -> None:
     found = examine([_recording(load_n, _behind(load_n, 4.0, 2, 4))])
     assert (found.faults, found.refusals) == ((), ())
     assert len(found.recordings[0]) == 400
+
+
+def test_a_table_of_a_blank_and_a_held_channel_is_used_at_the_moments_of_both() -> None:
+    """And each of the two findings is of all samples that remain."""
+    load_n = _load_n()
+    reading = 0.2 * load_n + 0.05 * np.random.default_rng(1).standard_normal(load_n.size)
+    reading[1::2] = np.nan
+    found = examine([_recording(_held(load_n, 10), reading)])
+    (taken,) = found.recordings
+    assert len(taken) == pytest.approx(load_n.size / 10, abs=2)
+    assert [(one.kind, one.share) for one in found.faults] == [("missing_samples", 1.0), ("held_samples", 1.0)]
+    assert {(one.start_s, one.stop_s) for one in found.faults} == {(taken.time_s[0], taken.time_s[-1])}
+
+
+@pytest.mark.parametrize("rest_s", [20.0, 60.0])
+def test_a_load_that_was_set_step_by_step_after_a_preload_is_known_between_its_steps(rest_s: float) -> None:
+    """Longer than the first four thousand samples after its first change: it is told where it moves."""
+    stairs = 1.0 + np.round(_held(_load_n(), 10), 2)
+    preload = np.ones(round(rest_s / STEP_S))
+    load_n = np.concatenate([np.zeros(100), preload, stairs])
+    given_ = _recording(load_n, _behind(load_n, 3.0, 0, 1))
+    assert without_held([given_], STANDARD) == [(given_, [])]
+    went_on = np.concatenate([np.zeros(100), preload, 1.0 + _load_n()])
+    given_ = _recording(load_n, _behind(went_on, 3.0, 0, 1))
+    ((taken, findings),) = without_held([given_], STANDARD)
+    assert [one.kind for one in findings] == ["held_samples"]
+    assert len(taken) == pytest.approx(load_n.size / 10, abs=2)

@@ -162,14 +162,15 @@ def test_where_nothing_is_asked_for_the_record_decides_as_it_is() -> None:
 @pytest.mark.parametrize(
     ("name", "number", "asked"),
     [
-        ("standing", float("nan"), "a number above 0 and at most 0.5"),
+        ("standing", float("nan"), "a number of at least 0.0001 and at most 0.5"),
         ("hold_s", None, "a number above 0"),
         ("hold_s", float("inf"), "a number above 0"),
         ("imperfection", 0.0, "a number above 0"),
         ("strength_sd", 0.0, "a number above 0"),
         ("false_name", 0.0, "a number above 0 and at most 1"),
         ("false_alarm", 1.5, "a number above 0 and at most 1"),
-        ("standing", 0.0, "a number above 0"),
+        ("standing", 0.0, "a number of at least 0.0001"),
+        ("standing", 0.99e-4, "a number of at least 0.0001"),
         ("clear", 0.5, "a number of at least 1"),
         ("held_out_every", 1, "a whole number of at least 2"),
         ("least_samples", 0, "a whole number above 0"),

@@ -131,6 +131,20 @@ def _ramps(late_s: float, drift: float = 0.0, seed: int = 2, step_s: float = 20.
     )
 
 
+@pytest.mark.parametrize("known_s", [(0.0, 300.0), (60.0, 300.0), (99.0, 300.0), (0.0, 198.0)])
+@pytest.mark.parametrize("missing", ["reading", "load"])
+def test_a_lag_is_counted_from_the_recordings_start_also_where_an_end_is_missing(
+    known_s: tuple[float, float], missing: str
+) -> None:
+    late_s, drift = 0.5, 0.005
+    whole = _ramps(late_s, drift, step_s=40.0)
+    channel = whole.load if missing == "load" else whole.sensor
+    there = (whole.time_s >= known_s[0]) & (whole.time_s <= known_s[1])
+    found = examine([whole.with_channel(channel.with_values(np.where(there, channel.values, np.nan)))], STANDARD)
+    assert found.one_clock == OneClock(pytest.approx(late_s, abs=0.03), pytest.approx(drift, rel=0.05))
+    assert found.clock_offset_s == pytest.approx((late_s + 0.5 * drift * whole.duration_s,), abs=0.03)
+
+
 def _reversed(recording: Recording) -> Recording:
     return recording.with_channel(replace(recording.sensor, values=-recording.sensor.values))
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smartshoe.signals.loading import turning_points
+from smartshoe.signals.loading import rises_of, turning_points
 
 
 def plain(loads: list[float], threshold: float) -> list[int]:
@@ -42,3 +42,24 @@ def test_a_triangle_turns_where_it_was_drawn_whatever_ripples_on_it(ripple: floa
 
 def test_nothing_turns_in_no_sample() -> None:
     assert turning_points(np.zeros(0), 0.1) == [-1]
+
+
+@given(
+    loads=st.lists(st.integers(-5, 5).map(float) | st.floats(-5.0, 5.0), min_size=1, max_size=40),
+    threshold=st.sampled_from([0.0, 0.5, 1.0, 3.0]),
+)
+def test_a_rise_goes_up_by_more_than_what_makes_one_also_at_the_ends(loads: list[float], threshold: float) -> None:
+    """And one is found where a load has risen by more and falls again by more, or ends."""
+    load = np.array(loads)
+    found = rises_of(load, threshold)
+    assert all(foot < top and load[top] - load[foot] > threshold for foot, top in found)
+    risen = load - np.minimum.accumulate(load)
+    falls = load - np.minimum.accumulate(load[::-1])[::-1]
+    falls[-1] = np.inf
+    assert bool(found) or not np.any((risen > threshold) & (falls > threshold))
+
+
+@pytest.mark.parametrize(("threshold", "rises"), [(0.1, 1), (0.08, 1), (0.07, 2)])
+def test_a_bump_after_a_press_that_falls_by_less_is_no_rise(threshold: float, rises: int) -> None:
+    load = np.interp(np.arange(400), [20, 80, 140, 300, 320, 340, 399], [0.0, 1.0, 0.0, 0.0, 0.085, 0.01, 0.02])
+    assert len(rises_of(load, threshold)) == rises
