@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import weakref
 from dataclasses import replace
@@ -408,7 +407,6 @@ def test_what_a_unit_would_read_is_simulated_once_for_all_its_causes_and_kept_no
     for again in (1, 2):
         _next(monkeypatch, causes, contests, predicted=predicted)
         assert asked == ["steps", "rates", "long_hold"] * again
-        gc.collect()
         assert not kept
 
 
