@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import NORMAL_QUARTILE, autocovariance
@@ -27,6 +27,8 @@ from smartshoe.signals.noise import NORMAL_QUARTILE, autocovariance
 # Resolutions. Half and twice of each changed no name in two cases.
 COLOURS = 5  # time constants of the noise's coloured part
 PLACES = 64  # samples of a cycle at which repeats are compared
+TAPS = 64  # of a filter of the load
+RIDGE = 1e-6  # share of the taps' power, under which a filter's weights are not told
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +190,51 @@ def slow_structure(sessions: Sequence[Session], residuals: Sequence[Array], thre
     mean = float(np.mean(excess))
     sd = max(float(np.sqrt(spread)) / len(excess), 1e-300)
     return LackOfFit(float(np.sqrt(max(mean, 0.0))), mean / sd, len(excess), thresholds, sd)
+
+
+def predicted_structure(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
+    """Structure that a linear filter of the load predicts: a response that rings, or lags, as the model does not.
+
+    Noise is independent of past inputs (Ljung 1999, residual analysis). The filter, a finite impulse response within
+    which any sensor's lag is over, is fitted to one half of each recording and predicts the other, so that chance gains
+    nothing. The score is that of the ratio of squares with and without it, in its logarithm, over blocks of ``hold_s``.
+    """
+    designs = [_increments(one, thresholds.clear * thresholds.settled_s) for one in sessions]
+    halves = [_halves(one) for one in sessions]
+    squares: list[tuple[float, float, int]] = []  # of each block: without, with, samples
+    for fitted, other in ((0, 1), (1, 0)):
+        gram, right = np.zeros((TAPS, TAPS)), np.zeros(TAPS)
+        for columns, residual, half in zip(designs, residuals, halves, strict=True):
+            rows = columns[half[fitted]]
+            gram += rows.T @ rows
+            right += rows.T @ residual[half[fitted]]
+        weights = np.linalg.solve(gram + max(RIDGE * float(np.trace(gram)), 1e-300) * np.eye(TAPS), right)
+        for session, columns, residual, half in zip(sessions, designs, residuals, halves, strict=True):
+            width = max(round(thresholds.hold_s / session.conditions.step_s), 1)
+            for at in np.split(half[other], range(width, half[other].size, width)):
+                left, predicted = residual[at], columns[at] @ weights
+                squares.append((float(left @ left), float((left - predicted) @ (left - predicted)), at.size))
+    without, remaining, counts = np.array([one for one in squares if min(one) > 0]).reshape(-1, 3).T
+    if without.size < thresholds.few:
+        return LackOfFit(0.0, 0.0, 0, thresholds)
+    gains = np.log(without / remaining)
+    sd = max(float(gains.std(ddof=1)), 1e-300) / math.sqrt(gains.size)
+    power = float(np.sum(without - remaining) / counts.sum())
+    return LackOfFit(math.sqrt(max(power, 0.0)), float(gains.mean()) / sd, gains.size, thresholds)
+
+
+def _increments(session: Session, reach_s: float) -> Array:
+    """(n, `TAPS`) increments of the load over the last ``reach_s``, one for each tap; 0 before the recording."""
+    load, step_s = session.conditions.load, session.conditions.step_s
+    places = np.arange(load.size)[:, None] - np.arange(TAPS + 1) * (reach_s / TAPS / step_s)
+    delayed = np.interp(places, np.arange(load.size), load)
+    return np.asarray(delayed[:, :-1] - delayed[:, 1:])
+
+
+def _halves(session: Session) -> tuple[Index, Index]:
+    """The fitted samples of each half of a recording."""
+    at = np.flatnonzero(session.fitted)
+    return at[at < session.fitted.size // 2], at[at >= session.fitted.size // 2]
 
 
 def _quiet_blocks(rows: Array) -> Mask:

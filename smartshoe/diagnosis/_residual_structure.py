@@ -12,21 +12,22 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._excitation import stays_still
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
-from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating_structure, slow_structure
+from smartshoe.diagnosis._lack_of_fit import LackOfFit, predicted_structure, repeating_structure, slow_structure
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualStructure:
-    """The structure of a residual, shares of full scale, by two tests of lack of fit.
+    """The structure of a residual, shares of full scale, by three tests of lack of fit.
 
-    ``repeating`` and ``slow`` are the tests. ``memory`` describes the slow part: where it is noise it is no structure,
+    ``repeating``, ``slow`` and ``predicted`` are the tests. ``memory`` describes the slow part: where it is noise it is no structure,
     however slow. ``says`` where the structure is largest. ``size`` is all that exceeds white noise.
     """
 
     repeating: LackOfFit
     slow: LackOfFit
+    predicted: LackOfFit
     memory: GaussMarkov | None
     says: str
     size: float
@@ -45,8 +46,11 @@ class ResidualStructure:
     def how(self) -> str:
         """How the largest part behaves, for a sentence.
 
-        It repeats with the load cycles, it changes slowly, or it is correlated only over short times.
+        It repeats with the load cycles, it follows the load, it changes slowly, or it is correlated only over short
+        times.
         """
+        if self.predicted.significant and self.predicted.rms >= self.rms:
+            return "follows the load"
         if self.repeating.significant and self.repeating.rms >= self.rms:
             return "repeats"
         return "changes slowly" if self.slow.significant else "is correlated over time"
@@ -77,8 +81,8 @@ class ResidualStructure:
     def _significant_rms(self) -> list[float]:
         """The rms of each significant test, shares of full scale."""
         if self.memory is not None and self.memory.is_noise:
-            return [self.repeating.rms] if self.repeating.significant else []
-        found = [one.rms for one in (self.repeating, self.slow) if one.significant]
+            return [one.rms for one in (self.repeating, self.predicted) if one.significant]
+        found = [one.rms for one in (self.repeating, self.slow, self.predicted) if one.significant]
         # A correlated part that at least one test shows to be no stationary noise is structure, even if it does not
         # repeat.
         remembered = min(self.memory.beyond_noise, self.size) if self.memory is not None else 0.0
@@ -88,7 +92,7 @@ class ResidualStructure:
 def residual_structure(
     sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds, quick: LackOfFit | None = None
 ) -> ResidualStructure:
-    """Both tests of the ``residuals``, (n,) for each session, and the place of the largest part.
+    """The tests of the ``residuals``, (n,) for each session, and the place of the largest part.
 
     ``quick`` is the test of repetition at the full rate: thinning averages out what swings faster than the fastest
     ramp.
@@ -105,6 +109,7 @@ def residual_structure(
     return ResidualStructure(
         repeats,
         slow_structure(sessions, residuals, thresholds),
+        predicted_structure(sessions, residuals, thresholds),
         memory,
         says,
         beyond_noise(sessions, residuals, thresholds),

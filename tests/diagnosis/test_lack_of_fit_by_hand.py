@@ -21,10 +21,12 @@ from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._lack_of_fit import (
     COLOURS,
     PLACES,
+    TAPS,
     LackOfFit,
     _loudness,
     _mean_variance,
     _quiet_blocks,
+    predicted_structure,
     repeating_structure,
     repeats,
     slow_structure,
@@ -420,6 +422,89 @@ def test_what_noise_leaves_in_a_mean_is_fitted_as_by_written_out_matrices(keep: 
 
 
 # -- in all -----------------------------------------------------------------------------------------------------------
+# -- what a filter of the load predicts -----------------------------------------------------------------------------
+def _random_loads(seed: int, count: int = 3000) -> list[Any]:
+    """Two recordings of a load that goes to and fro at random, as fast as in a quarter of a second."""
+    rng = np.random.default_rng(seed)
+    return [_session(lfilter([1.0], [1.0, -0.8], 0.1 * rng.standard_normal(count)), step_s=0.05) for _ in range(2)]
+
+
+def _ringing(session: Any) -> Array:
+    """What a mode of 3 Hz, damped by a twentieth, answers to the load's increments."""
+    turn = 2.0 * math.pi * 3.0 * 0.05
+    poles = np.exp([complex(-0.05 * turn, turn), complex(-0.05 * turn, -turn)])
+    load = session.conditions.load
+    return np.asarray(lfilter([1.0], np.poly(poles).real, np.diff(load, prepend=load[0])))
+
+
+def _slow_predicted(sessions: list[Any], residuals: list[Array]) -> tuple[float, float, int]:
+    reach = STANDARD.clear * STANDARD.settled_s
+    ratios, saved, count = [], 0.0, 0
+    for first in (True, False):
+        rows, targets = [], []
+        for session, residual in zip(sessions, residuals, strict=True):
+            load, step_s = session.conditions.load, session.conditions.step_s
+            at = [i for i in range(load.size) if (i < load.size // 2) is first and session.fitted[i]]
+            ago = [np.interp(np.array(at) * step_s - k * reach / TAPS, step_s * np.arange(load.size), load)
+                   for k in range(TAPS + 1)]  # fmt: skip
+            rows.append(np.column_stack([ago[k] - ago[k + 1] for k in range(TAPS)]))
+            targets.append(residual[at])
+        whole, target = np.vstack(rows), np.concatenate(targets)
+        ridge = math.sqrt(1e-6 * float(np.sum(whole**2)))
+        weights = np.linalg.lstsq(
+            np.vstack([whole, ridge * np.eye(TAPS)]), np.concatenate([target, np.zeros(TAPS)]), rcond=None
+        )[0]
+        for session, residual in zip(sessions, residuals, strict=True):
+            load, step_s = session.conditions.load, session.conditions.step_s
+            at = [i for i in range(load.size) if (i < load.size // 2) is not first and session.fitted[i]]
+            width = round(STANDARD.hold_s / step_s)
+            for begin in range(0, len(at), width):
+                block = np.array(at[begin : begin + width])
+                ago = [np.interp(block * step_s - k * reach / TAPS, step_s * np.arange(load.size), load)
+                       for k in range(TAPS + 1)]  # fmt: skip
+                left = residual[block] - sum(weights[k] * (ago[k] - ago[k + 1]) for k in range(TAPS))
+                ratios.append(math.log(np.sum(residual[block] ** 2) / np.sum(left**2)))
+                saved += float(np.sum(residual[block] ** 2) - np.sum(left**2))
+                count += block.size
+    score = float(np.mean(ratios)) / (float(np.std(ratios, ddof=1)) / math.sqrt(len(ratios)))
+    return math.sqrt(max(saved / count, 0.0)), score, len(ratios)
+
+
+def test_what_a_filter_of_the_load_predicts_is_that_of_written_out_sums() -> None:
+    sessions = _random_loads(1, 700)
+    sessions[1].fitted = np.arange(700) % 50 > 4
+    residuals = [_ringing(one) + 0.1 * np.random.default_rng(2).standard_normal(700) for one in sessions]
+    rms, score, blocks = _slow_predicted(sessions, residuals)
+    found = predicted_structure(sessions, residuals, STANDARD)
+    assert (found.rms, found.z, found.pairs) == (pytest.approx(rms, rel=1e-6), pytest.approx(score, rel=1e-6), blocks)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_unit_that_rings_under_random_loads_is_told_from_noise_of_that_colour(seed: int) -> None:
+    """Neither repeats, and neither is slow: only the load, which the one follows, tells them apart."""
+    sessions, others = _random_loads(seed), _random_loads(100 + seed)
+    rings = [_ringing(one) for one in sessions]
+    found = predicted_structure(sessions, rings, STANDARD)
+    rms = math.sqrt(float(np.mean(np.square(rings))))
+    assert found.significant
+    assert 0.75 * rms < found.rms <= rms
+    assert not repeating_structure(sessions, rings, STANDARD).significant
+    noise = predicted_structure(sessions, [_ringing(one) for one in others], STANDARD)
+    assert not noise.significant
+    assert noise.rms < 0.2 * rms
+    loud = [one + 10.0 * other for one, other in zip(rings, [_ringing(one) for one in others], strict=True)]
+    assert predicted_structure(sessions, loud, STANDARD).rms < 2.0 * rms
+
+
+def test_of_a_load_that_stands_of_nothing_left_and_of_few_blocks_nothing_is_predicted() -> None:
+    still = [_session(np.full(600, 0.5))]
+    for sessions, residual in ((still, np.random.default_rng(1).standard_normal(600)), (still, np.zeros(600))):
+        found = predicted_structure(sessions, [residual], STANDARD)
+        assert (found.rms, found.significant) == (0.0, False)
+    short = _random_loads(1, 100)[:1]
+    assert predicted_structure(short, [_ringing(short[0])], STANDARD).pairs == 0
+
+
 def test_what_is_beyond_white_noise_is_counted_by_samples() -> None:
     long, short = (_session(np.zeros(size)) for size in (900, 300))
     part = np.ones(300, dtype=bool)

@@ -351,7 +351,7 @@ def test_what_remembers_nothing_is_no_structure() -> None:
     memory: Any = SimpleNamespace(is_noise=False, beyond_noise=0.003)
     for rms, size, found in ((0.003, 0.002, 0.002), (0.0, 0.002, 0.0), (0.003, 0.0, 0.0)):
         memory.beyond_noise = rms
-        left = ResidualStructure(nothing, nothing, memory, "", size)
+        left = ResidualStructure(nothing, nothing, nothing, memory, "", size)
         assert (left.rms, left.significant) == (found, found > 0.0)
 
 

@@ -290,13 +290,16 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
     quiet = LackOfFit(0.009, 1.0, 9, STANDARD)
 
     def left(repeats_: LackOfFit, slow_: LackOfFit, memory: GaussMarkov | None = None) -> ResidualStructure:
-        return ResidualStructure(repeats_, slow_, memory, "", 0.0035)
+        return ResidualStructure(repeats_, slow_, quiet, memory, "", 0.0035)
 
     assert (left(repeated, wandering).rms, left(repeated, wandering).how) == (0.003, "repeats")
     assert (left(wandering, repeated).rms, left(wandering, repeated).how) == (0.003, "changes slowly")
     swings = left(quiet, quiet, _memory(rms=0.003, tau_s=math.inf))  # as a resonance does, within less than a block
     assert (swings.rms, swings.how) == (0.003, "is correlated over time")
     assert (left(quiet, quiet).rms, left(quiet, quiet).significant) == (0.0, False)
+    for memory in (None, _memory()):  # what follows the load is structure, be what is slow in it noise or not
+        rings = ResidualStructure(quiet, quiet, LackOfFit(0.003, 50.0, 9, STANDARD), memory, "", 0.0035)
+        assert (rings.rms, rings.how, rings.is_noise) == (0.003, "follows the load", False)
     # Noise with a memory is no structure; what has a memory and is no noise is, though no larger than all there is.
     noise, other = _memory(), _memory(spectrum_statistic=9.0)
     assert left(quiet, wandering, noise).is_noise
@@ -314,7 +317,7 @@ def test_what_wanders_is_noise_that_remembers_and_what_changes_slowly_but_not_wh
         (quiet, wandering, None, 0.002), (repeated, wandering, None, 0.0), (quiet, quiet, None, 0.0),
         (quiet, wandering, noise, 0.004 / math.sqrt(2.0)), (quiet, quiet, replace(noise, spectrum_statistic=9.0), 0.0),
     ):  # fmt: skip
-        assert ResidualStructure(repeats_, slow_, memory, "", 0.0035).sd_of_mean(3.0) == pytest.approx(most)
+        assert ResidualStructure(repeats_, slow_, quiet, memory, "", 0.0035).sd_of_mean(3.0) == pytest.approx(most)
 
 
 def test_what_is_left_is_tested_where_a_test_would_show_all_of_it() -> None:
@@ -323,8 +326,8 @@ def test_what_is_left_is_tested_where_a_test_would_show_all_of_it() -> None:
         (blind, blind, None, False), (keen, blind, None, False), (blind, keen, None, True),
         (blind, blind, _memory(), True),
     ):  # fmt: skip
-        assert ResidualStructure(repeats_, slow_, memory, "", 0.0035).is_tested is told
-    assert not ResidualStructure(keen, keen, None, "", 1e-6).is_tested
+        assert ResidualStructure(repeats_, slow_, blind, memory, "", 0.0035).is_tested is told
+    assert not ResidualStructure(keen, keen, keen, None, "", 1e-6).is_tested
 
 
 def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Session]) -> None:

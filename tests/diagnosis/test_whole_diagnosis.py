@@ -245,7 +245,8 @@ def test_a_load_that_pulls_as_much_as_it_presses_is_refused_in_newtons(runs: lis
 
 
 def _left(rms: float) -> ResidualStructure:
-    return ResidualStructure(LackOfFit(rms, 50.0, 9, Thresholds()), LackOfFit(0.0, 0.0, 0, Thresholds()), None, "", rms)
+    nothing = LackOfFit(0.0, 0.0, 0, Thresholds())
+    return ResidualStructure(LackOfFit(rms, 50.0, 9, Thresholds()), nothing, nothing, None, "", rms)
 
 
 def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
