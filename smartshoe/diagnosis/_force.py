@@ -184,6 +184,8 @@ def limit_latency_left(found: Compensation) -> list[str]:
 
 def limit_drift_held(found: Compensation, thresholds: Thresholds) -> list[str]:
     """The sentence on drifts that a calibration holds at their value at the end of the fitted data."""
+    if found.is_plain:
+        return []
     moved = found.filter.moved_by_the_clock
     held = [part for part in found.model.parts if math.isfinite(part.until_s)]
     held = [part for part in held if abs(moved.get(part.name, 0.0)) > thresholds.standing]

@@ -1,7 +1,7 @@
 """The sentences that limit a diagnosis: why an effect is no cause, and what no model can predict.
 
-A function ``reason_...`` says why one name is no cause, a function ``limit_...`` what holds for the diagnosis as a
-whole.
+A function ``reason_...`` says why one name is no cause, or returns None. A function ``limit_...`` says what holds for
+the diagnosis as a whole, in a list that is empty where there is nothing to be said.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ SAID = 4  # of many changes of a gain, or other such items, how many are listed
 
 def limit_clocks_disagree(
     clocks: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
-) -> str | None:
-    """The sentence where the fit's lag between clocks differs from the one that the edges showed; None otherwise.
+) -> list[str]:
+    """The sentence where the fit's lag between clocks differs from the one that the edges showed.
 
     The lag is that of all that makes the model late, in the middle of the fitted time. ``clocks`` are the effects, with
     values, by the edges.
     """
     if not {one.name for one, _ in clocks} & {*model.names}:
-        return None
+        return []
     middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in fitted_of(sessions)]))
     lag_s = sum(one.late_s(values, middle_s) for one, values in clocks)
     fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
-        return None
-    return (
+        return []
+    return [
         f"the reading is {_late(lag_s)} by the edges of load and reading, {_late(fitted_s)} beside the other"
         " effects: one of these imitates the difference (record both by one clock)"
-    )
+    ]
 
 
 def _late(lag_s: float) -> str:
@@ -135,12 +135,13 @@ def reason_clocks_aligned(name: Name) -> str:
     )
 
 
-def limit_remembered(name: Name) -> str:
-    """The sentence on a drift of the zero that the arms of effects may remember (`may_be_remembered`)."""
-    return (
+def limit_remembered(names: Sequence[Name]) -> list[str]:
+    """Sentences on drifts of the zero that the arms of effects may remember (`may_be_remembered`)."""
+    return [
         "recordings begin loaded, and what the unit remembers of loads before them would read as"
-        f" {in_words(name.effect.name)} does, which is half sure at most (record a rest before the first load)"
-    )
+        f" {in_words(one.effect.name)} does, which is half sure at most (record a rest before the first load)"
+        for one in names
+    ]
 
 
 def reason_few_cycles(name: Name, cycles: int) -> str:
@@ -167,22 +168,22 @@ def reason_departure(name: Name, names: Sequence[Name], thresholds: Thresholds) 
     )
 
 
-def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
     """The sentence on a unit that relaxes more slowly, or faster, than the baseline can follow."""
     slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
     if (
         not (slow or fast)
         or rms_difference(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable
     ):
-        return None
+        return []
     end_s = 1.0 / (RATE.lower if slow else RATE.upper)
-    return (
+    return [
         f"the baseline's relaxation has come to the end of its range, {end_s:.3g} s:"
         f" a unit that relaxes {'more slowly' if slow else 'faster'} is beyond it, and what is named may be that"
-    )
+    ]
 
 
-def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> str | None:
+def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> list[str]:
     """The sentence on a curve at the end of its range, in the model or as the law that names a block."""
     if ended := [part.name for part in model.parts if part.bends_too_little]:
         but = "and what it misses may stand in the names of other effects, which are half sure at most"
@@ -194,23 +195,23 @@ def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> str |
     ]
     if followed := [name for name, fitted in by if fitted.part(name).bends_too_little]:
         return _at_end_of_range(followed, "so that its parameters are bounds (the extended model keeps the free form)")
-    return None
+    return []
 
 
-def _at_end_of_range(curves: Sequence[str], follows: str) -> str:
+def _at_end_of_range(curves: Sequence[str], follows: str) -> list[str]:
     """The sentence on ``curves`` at the end of their range, and what ``follows`` from it."""
-    return (
+    return [
         f"{listed(curves, 'and')} has come to the end of its range: the unit bends farther than that equation can,"
         f" {follows}"
-    )
+    ]
 
 
-def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
     """The sentence on a leak, or heat, where the stiffness of the wall relative to the gas is not known."""
     units = {one.recording.sensor.unit.quantity for one in sessions}
     is_of_gas = any(part.effect.stage == "gas" for part in model.parts) and units.isdisjoint(NON_PRESSURES)
     if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # the ratio is known
-        return None
+        return []
     softest, stiffest = PAPER_WALL_RATIOS
     gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]
     if any("effective_area_m2" in one.metadata for one in gauges):
@@ -219,47 +220,58 @@ def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], threshol
     elif rms_difference(sessions, model, replace(model, wall_ratio=stiffest)) > thresholds.material:
         mend = "declare effective_area_m2"
     else:
-        return None
-    return (
+        return []
+    return [
         f"how stiff the wall is beside the gas is not known (N = {model.wall_ratio:g} is taken, units of the paper have"
         f" {softest:g} to {stiffest:g}): rates of leaks and times of heat go with it, beyond their intervals"
         f" ({mend})"
-    )
+    ]
 
 
-def limit_rejected(gained: Gain, beyond: str | None) -> str:
+def limit_rejected(gained: Gain, beyond: str | None) -> list[str]:
     """The sentence on an extension that is rejected; ``beyond``: how held-out loads exceed the fitted ones."""
+    if not gained.is_rejected:
+        return []
     low, high = gained.ci95
     least, most = (percent(-0.01 * bound) for bound in (high, low))
     by = f"by {least.removesuffix(' %')} to {most}" if gained.is_certain else "which may be chance"
     why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
-    return (
+    return [
         f"on held-out data the extended model is worse than the baseline ({gained.rmse_before:.4g} to"
         f" {gained.rmse_after:.4g} {gained.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
         " baseline's until such a recording is among those that are fitted"
-    )
+    ]
 
 
-def limit_held_out_excess(off: float, within: float, beyond: str | None) -> str:
+def limit_held_out_excess(off: float, within: float, beyond: str | None) -> list[str]:
     """The sentence on recordings that were not fitted and are ``off`` by far more than fitted ones (``within``)."""
+    if not off:
+        return []
     why = beyond or (
         "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
         " changed, or the model follows the fitted ones for a wrong reason"
     )
-    return f"held-out recordings are off by {percent(off)} of full scale, fitted ones by {percent(within)}: {why}"
+    return [f"held-out recordings are off by {percent(off)} of full scale, fitted ones by {percent(within)}: {why}"]
 
 
-def limit_zero_drifted(zero: Zero, scale: Scale) -> str:
+def limit_zero_drifted(zeros: Sequence[Zero], scale: Scale) -> list[str]:
     """The sentence on an offset that may be a drift which began before the recordings."""
-    value = zero.value * scale.reading
-    return (
-        f"the zero is at {value:.3g} {scale.unit.symbol} where the recordings begin, and drifts that way: the drift may"
-        " have begun before, or there is an offset as well (record from where the unit is switched on)"
-    )
+    return [
+        f"the zero is at {zero.value * scale.reading:.3g} {scale.unit.symbol} where the recordings begin, and drifts"
+        " that way: the drift may have begun before, or there is an offset as well (record from where the unit is switched on)"
+        for zero in zeros
+        if zero.may_have_drifted
+    ]
 
 
-def limit_zero_extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
-    """The sentence on a zero that is extrapolated from loads at which the unit was never seen unloaded.
+def limit_zero_extrapolated(zeros: Sequence[Zero], scale: Scale, thresholds: Thresholds) -> list[str]:
+    """The sentence on a zero that is extrapolated from loads at which the unit was never seen unloaded."""
+    told = (one for one in zeros if one.extrapolated_from and not one.may_have_drifted)
+    return [_extrapolated(one, scale, thresholds) for one in told]
+
+
+def _extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
+    """The sentence on one extrapolated ``zero``.
 
     If the unit is unloaded at some time, but not at the start, only its memory of earlier loads is unknown.
     """
@@ -278,30 +290,30 @@ def limit_zero_extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) ->
 
 def limit_curves_in_tare(
     zeros: Sequence[Zero], effects: Sequence[Effect], scale: Scale, thresholds: Thresholds
-) -> tuple[str, ...]:
+) -> list[str]:
     """The sentence on curves among ``effects`` whose full scale includes a tare.
 
     Over another range the same curve has other parameters: a parabola's distance from its chord goes with the square.
     """
     curves = [effect.name for effect in effects if effect.is_memoryless]
-    return tuple(
+    return [
         f"full scale is {scale.load_n:.4g} N of the load as logged, {(1.0 + tare.value) * scale.load_n:.4g} N without"
         f" the tare: the parameters of the {listed(curves)} are of a curve over all of the former (take the tare off"
         " the loads for those of the latter)"
         for tare in zeros
         if curves and tare.effect.shifts == "load" and abs(tare.value) > thresholds.standing
-    )
+    ]
 
 
-def limit_force_as_logged(zeros: Sequence[Zero], scale: Scale) -> tuple[str, ...]:
+def limit_force_as_logged(zeros: Sequence[Zero], scale: Scale) -> list[str]:
     """The sentence on the force of a calibration that was made with a load cell that has a tare."""
-    return tuple(
+    return [
         "a calibration gives the force as the load cell shows it,"
         f" {abs(tare.value) * scale.load_n:.3g} N {'more' if tare.value < 0.0 else 'less'} than what presses (take the"
         " tare off the loads for one that does not)"
         for tare in zeros
         if tare.effect.shifts == "load"
-    )
+    ]
 
 
 def reason_tare_creeps(drift: Name, tare: Zero | None) -> str | None:

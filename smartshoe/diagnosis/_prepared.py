@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._aligned import Aligned, aligned, with_lags_removed
@@ -82,7 +83,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         *said_of_neighbours,
         *clocks.says,
         *said_of_length,
-        *(said for said in slow if said is not None),
+        *chain.from_iterable(slow),
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
         *excitation.limits(),

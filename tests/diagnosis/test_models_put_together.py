@@ -89,7 +89,7 @@ def test_what_a_filter_would_make_of_spikes_is_said(parts: Any) -> None:
 
 
 def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
-    parts.wall_ratio = "no such wall"
+    parts.wall_ratio = ["no such wall"]
     assert run_diagnosis(parts).limits == ("limit", "no such wall")
     (model, sessions, thresholds), _ = parts.seen["limit_wall_ratio"]
     assert (model.names, model.noise) == (parts.found.fit.model.names, parts.off)  # what is left of the reading
@@ -99,11 +99,11 @@ def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
 def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     parts: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    parts.not_undone, parts.wall_ratio = ["not undone"], "no such wall"
+    parts.not_undone, parts.wall_ratio = ["not undone"], ["no such wall"]
     told = run_diagnosis(parts)
     assert told.limits == ("limit", "not undone", "no such wall")
     assert told.limits_of_the_force == ("not undone",)  # the wall is the model's
-    parts.wall_ratio = None
+    parts.wall_ratio = []
     (model, step_s), _ = parts.seen["limit_not_undone"]
     assert model.names == parts.found.fit.model.names
     assert step_s == 0.05
