@@ -104,7 +104,7 @@ def _first_parts(clocks: Aligned, lengths: Sequence[int]) -> tuple[Aligned, list
     if not cut:
         return clocks, []
     said = (
-        f"loads as quick as these are not all fitted at once, {first_names(cut)}: what changes later is not seen (fit"
-        " shorter recordings, from early and from late)"
+        f"fast loads over so long a time are too many samples for one fit: {first_names(cut)} are used, and what"
+        " changes later is not seen (fit shorter recordings, from early and from late)"
     )
     return replace(clocks, recordings=recordings, usable=usable), [said]

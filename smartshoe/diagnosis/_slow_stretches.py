@@ -64,7 +64,7 @@ def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, t
     after = spacing.after[slow]
     apart_s = float(np.median(time_s[after] - time_s[after - 1]))
     return [
-        f"{recording.label}: from {moment(float(at_s[first]))} to {moment(float(at_s[last - 1]))} s"
-        f" {percent(float(slow.mean()))} of it is not used: samples are {apart_s:.3g} s apart there, and fits that"
-        f" follow its load need one in {longest_s:.3g} s (log at one rate, or give that stretch as a file of its own)"
+        f"{recording.label}: {percent(float(slow.mean()))} of it is not used, between {moment(float(at_s[first]))} and"
+        f" {moment(float(at_s[last - 1]))} s: samples are {apart_s:.3g} s apart there; to follow this load, fits need"
+        f" one every {longest_s:.3g} s (log at one rate, or give that stretch as a file of its own)"
     ]

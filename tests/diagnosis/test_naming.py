@@ -291,7 +291,7 @@ def test_a_curve_at_the_end_of_its_range_bends_too_little(name: str, values: dic
     said = limit_curve_range(model)
     assert len(said) == ends
     if ends:
-        assert said[0].startswith(f"{in_words(name)} has come to the end of its range")
+        assert said[0].startswith(f"{in_words(name)} is at the end of the range")
     # The same of a law that a free form in the model is named by.
     block = member("flexible_curve")
     told = Name(block, one, 0.9, 0.9, (), law_in_place=Alternative(name, 0.0, replace(block.without, model=model)))
