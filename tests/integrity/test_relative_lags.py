@@ -172,7 +172,7 @@ def test_a_sound_unit_of_which_one_recording_is_late_is_as_good_as_another(proto
     assert (found.verdict, found.causes) == ("adequate", ())
     (said,) = [fault.says for fault in found.data_faults if fault.kind == "two_clocks"]
     assert "the reading is 0.10 s late, more than in the other recordings" in said
-    assert ": the reading lags the load by 0.1" in found.limits[0]
+    assert ": the reading lags the load by 0.09" in found.limits[0]
     assert "was shifted to the load's clock before anything else" in found.limits[0]
 
 
