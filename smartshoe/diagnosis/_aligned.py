@@ -59,14 +59,16 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
         if offset_s or rate:
             moved.append(place)
             recording, mask = _on_one_clock(recording, mask, float(offset_s), float(rate))
-            way = "earlier" if offset_s > 0 else "later"
-            more = f" in the middle, by {abs(rate):.2g} s {'more' if rate * offset_s >= 0 else 'less'} each second,"
-            by = f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}{more if rate else ''}"
+            does = "lags" if offset_s > 0 else "leads"
+            more = f" in the middle, by {abs(rate):.2g} s {'more' if rate * offset_s >= 0 else 'less'} each second"
+            by = f"by {abs(offset_s):.3g} s{more if rate else ''}"
             says.append(
-                f"{by} to the clock of the recordings that are fitted, before it judges"
+                f"{recording.label}: the reading {does} those of the fitted recordings {by}; it was shifted to their"
+                " clock before it is used as held-out data"
                 if place in integrity.others
-                else f"{by} to the load's clock before anything else: nothing is said of delays in it, and if it is the"
-                " unit that is late, the force of a calibration is as late"
+                else f"{recording.label}: the reading {does} the load {by}, as with two clocks, and was shifted to the"
+                " load's clock before anything else: delays of this recording are not diagnosed; if the unit itself is"
+                " late, the force of a calibration is late by as much"
             )
         made.append(recording)
         usable.append(mask if clock_in_model is None else mask & _is_load_known(recording, clock_in_model))

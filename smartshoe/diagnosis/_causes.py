@@ -93,9 +93,9 @@ def _how_sure(
     if not name.is_sure:
         does_most_alone = found.best_single is not None and found.best_single.kind == name.effect.kind
         why = (
-            "by itself it predicts best what is left out"
+            "by itself it predicts left-out data best"
             if does_most_alone
-            else "it is larger than all that is left, or than small imperfections and the errors of the laws beside it"
+            else "it is larger than all that is left unexplained, or than small imperfections and errors of other laws"
         )
         doubt = "it may stand for the error of another equation, or for part of another cause"
         if name.equivalents or likelier_of(rivals, name.equivalents):
@@ -137,9 +137,10 @@ def _beside_kin(name: Name) -> list[Statement]:
     kin = name.member.kin
     if not kin:
         return []
+    alike = "an effect of the same kind" if len(kin) == 1 else "effects of the same kind"
     says = (
-        f"the extended model has {listed(kin)} beside it, of one kind with it: either takes"
-        " most of the other's part, so that size, gain and fall are of all of them together"
+        f"the extended model also has {listed(kin, 'and')}, {alike}: one can take most of another's part, so that size,"
+        " gain and fall are those of all of them together"
     )
     return [Statement("other effects of its kind in the model", float(len(kin)), 0.0, says)]
 
@@ -191,7 +192,7 @@ def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds
         "deviations from nothing",
         deviations,
         largest_of_noise(1, thresholds),
-        f"it is {deviations:.3g} standard deviations from nothing",
+        f"it is {deviations:.3g} standard deviations from zero",
     )
     sure = (
         1.0 - thresholds.false_name if zero.is_seen else thresholds.least_confidence,  # or seen by the model only

@@ -138,8 +138,8 @@ def limit_clipped(found: Compensation) -> list[str]:
     if not found.clipped:
         return []
     return [
-        f"errors of the force leave out {percent(found.clipped)} of samples, at which the extended model is clipped:"
-        " more than half of its slope is lost, so that a reading tells no load"
+        f"errors of the force leave out {percent(found.clipped)} of the samples: there the extended model clips, which"
+        " takes more than half of its slope; such a reading tells no load"
     ]
 
 
@@ -147,22 +147,22 @@ def limit_force(found: Compensation) -> list[str]:
     """The sentence on an extended model that gives a worse force than the plain one, or than a part of itself."""
     if found.rejected is not None:
         return [
-            "the force that the extended model gives back is worse than the baseline's on held-out data"
-            f" ({found.before.held_out_n:.3g} to {found.rejected.held_out_n:.3g} N): the calibration compensates by the"
-            " baseline, and its twin simulates with the effects"
+            "on held-out data the force by the extended model is worse than by the baseline (error"
+            f" {found.rejected.held_out_n:.3g} N instead of {found.before.held_out_n:.3g} N): the calibration corrects"
+            " by the baseline; its twin simulates with the effects"
         ]
     if found.is_plain:
         return [
-            "the extended model fits the reading but gives a worse force: on what was fitted it is off by"
-            f" {found.whole.fitted_n:.3g} N, the baseline by {found.before.fitted_n:.3g} N; so the calibration"
-            " compensates by the baseline, and its twin simulates with the effects"
+            "the extended model fits the reading but gives a worse force (error on the fitted data"
+            f" {found.whole.fitted_n:.3g} N instead of {found.before.fitted_n:.3g} N by the baseline): the calibration"
+            " corrects by the baseline; its twin simulates with the effects"
         ]
     if found.passed_over:
         return [
-            f"the calibration does not undo {listed(found.passed_over)}, which would make more of the noise than it"
-            f" takes off: on what was fitted the force is off by {found.error.fitted_n:.3g} N without, by"
-            f" {found.whole.fitted_n:.3g} N with, by {found.before.fitted_n:.3g} N by the baseline; its twin simulates"
-            " with all effects"
+            f"the calibration does not correct {listed(found.passed_over)}: that would amplify noise and other errors"
+            f" by more than it removes (error of the force on the fitted data: {found.error.fitted_n:.3g} N without"
+            f" this correction, {found.whole.fitted_n:.3g} N with it, {found.before.fitted_n:.3g} N by the baseline);"
+            " its twin simulates with all effects"
         ]
     return []
 
@@ -170,20 +170,22 @@ def limit_force(found: Compensation) -> list[str]:
 def limit_not_undone(model: ExtendedModel, step_s: float) -> list[str]:
     """Sentences on effects that no compensator can remove from a stream of readings."""
     passed_over = ExtendedCompensator(model, 1.0 / step_s).not_inverted
-    return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
+    return [f"no compensator can correct the {name.replace('_', ' ')}: {why}" for name, why in passed_over.items()]
 
 
 def limit_latency_left(found: Compensation) -> list[str]:
     """Sentences on latencies that are undone in part only, to limit the noise."""
     return [
-        f"the calibration leaves {1e3 * left_s:.3g} ms of the {in_words(name)}: undoing all of it would raise"
-        " fast noise too much, and where loads are quicker than those judged here the force is that late"
+        f"the calibration leaves {1e3 * left_s:.3g} ms of the {in_words(name)}: correcting all of it would amplify fast"
+        " noise too much; under loads faster than those judged here, the force is late by as much"
         for name, left_s in found.filter.lags_left_s.items()
     ]
 
 
 def limit_drift_held(found: Compensation, thresholds: Thresholds) -> list[str]:
     """The sentence on drifts that a calibration holds at their value at the end of the fitted data."""
+    if found.is_plain:
+        return []
     moved = found.filter.moved_by_the_clock
     held = [part for part in found.model.parts if math.isfinite(part.until_s)]
     held = [part for part in held if abs(moved.get(part.name, 0.0)) > thresholds.standing]
@@ -191,9 +193,10 @@ def limit_drift_held(found: Compensation, thresholds: Thresholds) -> list[str]:
         return []
     said = ", ".join(f"{in_words(part.name)} by {percent(moved[part.name], signed=True)}" for part in held)
     return [
-        f"the calibration takes off by the clock what no law is named for, up to {held[0].until_s:.4g} s, the end of"
-        f" what was fitted, and holds it from then on, since nothing tells how it goes on: there it moves a full-scale"
-        f" force ({said}); reset it where a session begins, and fit a recording as long as its sessions are to be"
+        "the calibration corrects a drift that has no named law, by the clock and up to the end of the fitted data at"
+        f" {held[0].until_s:.4g} s: there it moves a full-scale force ({said}); after that the correction stays"
+        " constant, since nothing shows how the drift goes on; reset it where a session begins, and fit a recording as"
+        " long as the sessions are to be"
     ]
 
 
@@ -212,14 +215,14 @@ def limit_calibration_off(found: Compensation, thresholds: Thresholds) -> list[s
         if math.isnan(held_n) or worst_n <= thresholds.clear * max(held_n, least_n):
             return []
         return [
-            f"the force of {name} is off by {rounded(worst_n)} N (rms): the {rounded(held_n)} N of what is held out"
-            " do not hold for loads as it has"
+            f"the force of {name} is off by {rounded(worst_n)} N (rms): the {rounded(held_n)} N that are stated for"
+            " held-out data do not apply to loads like those of this recording"
         ]
     return [
-        "a calibration takes one zero for all recordings, and each to begin after a long rest: so the force of"
-        f" {name} is off by {rounded(worst_n)} N (rms); with its own zero, and what it bore before, allowed for it"
-        f" would be {rounded(stated_n)} N (zero the load cell and the sensor before each recording, and begin it with"
-        " a rest)"
+        "a calibration has one zero for all recordings and assumes a long rest before each: so the force of"
+        f" {name} is off by {rounded(worst_n)} N (rms); with its own zero and its earlier loads allowed for, it would"
+        f" be off by {rounded(stated_n)} N (zero the load cell and the sensor before each recording, and begin with a"
+        " rest)"
     ]
 
 
@@ -236,9 +239,9 @@ def limit_unsound_readings(found: Compensation, scale: Scale, thresholds: Thresh
     if with_n <= thresholds.clear * max(without_n, thresholds.tolerable * model.full_scale_load_n):
         return []
     return [
-        "a filter remembers samples that are no readings (they are left out here) as if they were loads: with them the"
-        f" force of {name} is off by {rounded(with_n)} N (rms) in its sound samples, without by {rounded(without_n)} N"
-        " (take them out before the filter: a median of three samples does for single ones)"
+        "a filter takes faulty samples, such as spikes, for loads and remembers them: with these samples left in, the"
+        f" force of {name} is off by {rounded(with_n)} N (rms) in its good samples; without them, as here, by"
+        f" {rounded(without_n)} N (remove them before the filter; a median of three samples is enough for single ones)"
     ]
 
 

@@ -1,7 +1,7 @@
 """The sentences that limit a diagnosis: why an effect is no cause, and what no model can predict.
 
-A function ``reason_...`` says why one name is no cause, a function ``limit_...`` what holds for the diagnosis as a
-whole.
+A function ``reason_...`` says why one name is no cause, or returns None. A function ``limit_...`` says what holds for
+the diagnosis as a whole, in a list that is empty where there is nothing to be said.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import rms_difference
 from smartshoe.diagnosis._zero import OwnZeros, Zero
-from smartshoe.display import percent, rounded
+from smartshoe.display import counted, percent, rounded
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect, in_words, listed
@@ -38,23 +38,24 @@ SAID = 4  # of many changes of a gain, or other such items, how many are listed
 
 def limit_clocks_disagree(
     clocks: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
-) -> str | None:
-    """The sentence where the fit's lag between clocks differs from the one that the edges showed; None otherwise.
+) -> list[str]:
+    """The sentence where the fit's lag between clocks differs from the one that the edges showed.
 
     The lag is that of all that makes the model late, in the middle of the fitted time. ``clocks`` are the effects, with
     values, by the edges.
     """
     if not {one.name for one, _ in clocks} & {*model.names}:
-        return None
+        return []
     middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in fitted_of(sessions)]))
     lag_s = sum(one.late_s(values, middle_s) for one, values in clocks)
     fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
-        return None
-    return (
-        f"the reading is {_late(lag_s)} by the edges of load and reading, {_late(fitted_s)} beside the other"
-        " effects: one of these imitates the difference (record both by one clock)"
-    )
+        return []
+    return [
+        f"by the edges of load and reading, the reading is {_late(lag_s)}; fitted with the other effects, it is"
+        f" {_late(fitted_s)}: another effect imitates the difference, so that no lag between the clocks is named"
+        " (record both by one clock)"
+    ]
 
 
 def _late(lag_s: float) -> str:
@@ -62,9 +63,9 @@ def _late(lag_s: float) -> str:
     return f"{abs(lag_s):.3g} s {'late' if lag_s >= 0.0 else 'early'}"
 
 
-def _unnamed(name: Name, but: str) -> str:
-    """The sentence on a name that is no cause, with the reason ``but``."""
-    return f"{in_words(name.effect.name)} fits, but {but}, so that it is not named"
+def _unnamed(name: Name, why: str) -> str:
+    """The sentence on a name that is no cause, with the reason ``why``."""
+    return f"{in_words(name.effect.name)} fits, but is not named: {why}"
 
 
 def reason_of_another_kind(name: Name, model: ExtendedModel, thresholds: Thresholds) -> str | None:
@@ -78,25 +79,25 @@ def reason_of_another_kind(name: Name, model: ExtendedModel, thresholds: Thresho
         and name.law_in_place is None
         and part.effect.departs_by(part.values) > thresholds.law_departure
     ):
-        return f"the reading {part.effect.why_unnamed}, which no effect of the catalogue does, so that it is not named"
+        return f"the reading {part.effect.why_unnamed}: no effect of the catalogue does this, so that it is not named"
     if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]
         at = f"{in_words(parameter.name)} at {value:g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
         return (
-            f"{in_words(name.effect.name)} fits best with its {at}, the end of its range, beyond which it acts like"
+            f"{in_words(name.effect.name)} fits best with its {at}, the end of its range: beyond it, it acts like"
             " another effect, so that it is not named"
         )
     if model.relaxing_share < 0.0 and part.name in dict(arms_of(model)):
         return _unnamed(
             name,
-            "only beside a baseline that falls in holds, as air that cools or leaves does: it may be the wall's own"
-            " relaxation",
+            "it fits only beside a baseline that falls in holds, as from air that cools or leaves; it may be the wall's"
+            " own relaxation",
         )
     if has_extreme_arm(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
         return _unnamed(
             name,
-            "only with the wall's relaxation at the end of its range, where no wall's is: one may imitate the other, or"
-            " undo it",
+            "it fits only with the wall's relaxation at the end of its range, where that of no real wall is; the two"
+            " may imitate or cancel each other",
         )
     return None
 
@@ -108,7 +109,7 @@ def reason_not_shown(name: Name, excitation: Excitation) -> str | None:
     one rate.
     """
     if excitation.hides(name.effect):
-        few = "recordings of one loading rate, without a hold, or of none that is seen,"
+        few = "recordings of one loading rate without a hold, or of no rate that can be seen,"
     elif excitation.shows(name.effect):
         return None
     else:
@@ -123,30 +124,32 @@ def reason_no_gas(name: Name, unit: Unit) -> str | None:
         return None
     return _unnamed(
         name,
-        f"a reading in {unit.symbol} is no gas's pressure: something gives way in holds, or comes back, as no law of"
-        " the catalogue does",
+        f"a reading in {unit.symbol} is no gas pressure; something gives way in holds, or comes back, by a law that the"
+        " catalogue does not have",
     )
 
 
 def reason_clocks_aligned(name: Name) -> str:
     """Why a latency is no cause where readings were shifted to the load's clock before."""
     return _unnamed(
-        name, "each reading was moved to the load's clock before, by its own lag, and this may be what is left of it"
+        name,
+        "each reading was shifted to the load's clock before, by its own lag; this may be what is left of that lag",
     )
 
 
-def limit_remembered(name: Name) -> str:
-    """The sentence on a drift of the zero that the arms of effects may remember (`may_be_remembered`)."""
-    return (
-        "recordings begin loaded, and what the unit remembers of loads before them would read as"
-        f" {in_words(name.effect.name)} does, which is half sure at most (record a rest before the first load)"
-    )
+def limit_remembered(names: Sequence[Name]) -> list[str]:
+    """Sentences on drifts of the zero that the arms of effects may remember (`may_be_remembered`)."""
+    return [
+        "recordings begin loaded: what the unit remembers of earlier loads would look like"
+        f" {in_words(one.effect.name)}, which is therefore half sure at most (record a rest before the first load)"
+        for one in names
+    ]
 
 
 def reason_few_cycles(name: Name, cycles: int) -> str:
     """Why an effect is no cause where there are as many surer ones as load cycles."""
-    said = _unnamed(name, f"so few load cycles ({cycles}) cannot show more causes than there are cycles")
-    return f"{said} (repeat the cycles)"
+    most = f"{counted(cycles, 'load cycle')} cannot show more than {counted(cycles, 'cause')}, and others are surer"
+    return f"{_unnamed(name, most)} (repeat the cycles)"
 
 
 def reason_departure(name: Name, names: Sequence[Name], thresholds: Thresholds) -> str | None:
@@ -167,99 +170,113 @@ def reason_departure(name: Name, names: Sequence[Name], thresholds: Thresholds) 
     )
 
 
-def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
     """The sentence on a unit that relaxes more slowly, or faster, than the baseline can follow."""
     slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
     if (
         not (slow or fast)
         or rms_difference(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable
     ):
-        return None
+        return []
     end_s = 1.0 / (RATE.lower if slow else RATE.upper)
-    return (
-        f"the baseline's relaxation has come to the end of its range, {end_s:.3g} s:"
-        f" a unit that relaxes {'more slowly' if slow else 'faster'} is beyond it, and what is named may be that"
-    )
+    return [
+        f"the baseline's relaxation is at the end of its range, {end_s:.3g} s:"
+        f" a unit that relaxes {'more slowly' if slow else 'faster'} cannot be followed, and what is named may stand"
+        " for this"
+    ]
 
 
-def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> str | None:
+def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> list[str]:
     """The sentence on a curve at the end of its range, in the model or as the law that names a block."""
     if ended := [part.name for part in model.parts if part.bends_too_little]:
-        but = "and what it misses may stand in the names of other effects, which are half sure at most"
-        return _at_end_of_range(ended, but)
+        return _at_end_of_range(ended, "the rest may be named as other effects, which are half sure at most")
     by = [
         (one.effect.name, one.law_in_place.fit.model)
         for one in names
         if one.law_in_place is not None and one.law_in_place.fit is not None
     ]
     if followed := [name for name, fitted in by if fitted.part(name).bends_too_little]:
-        return _at_end_of_range(followed, "so that its parameters are bounds (the extended model keeps the free form)")
-    return None
+        return _at_end_of_range(followed, "its parameters are bounds (the extended model keeps the free form)")
+    return []
 
 
-def _at_end_of_range(curves: Sequence[str], follows: str) -> str:
+def _at_end_of_range(curves: Sequence[str], follows: str) -> list[str]:
     """The sentence on ``curves`` at the end of their range, and what ``follows`` from it."""
-    return (
-        f"{listed(curves, 'and')} has come to the end of its range: the unit bends farther than that equation can,"
-        f" {follows}"
-    )
+    return [
+        f"{listed(curves, 'and')} {'is' if len(curves) == 1 else 'are'} at the end of the range: the unit's curve bends"
+        f" more than this equation can; {follows}"
+    ]
 
 
-def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
     """The sentence on a leak, or heat, where the stiffness of the wall relative to the gas is not known."""
     units = {one.recording.sensor.unit.quantity for one in sessions}
     is_of_gas = any(part.effect.stage == "gas" for part in model.parts) and units.isdisjoint(NON_PRESSURES)
     if not is_of_gas or model.wall_ratio != USUAL_WALL_RATIO:  # the ratio is known
-        return None
+        return []
     softest, stiffest = PAPER_WALL_RATIOS
     gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]
     if any("effective_area_m2" in one.metadata for one in gauges):
         least, most = WALL_RATIOS
-        mend = f"mend effective_area_m2: the declared one makes an N beyond {least:g} to {most:g}, which no tube has"
+        mend = (
+            f"correct effective_area_m2: the declared one gives an N outside {least:g} to {most:g}, which no tube has"
+        )
     elif rms_difference(sessions, model, replace(model, wall_ratio=stiffest)) > thresholds.material:
         mend = "declare effective_area_m2"
     else:
-        return None
-    return (
-        f"how stiff the wall is beside the gas is not known (N = {model.wall_ratio:g} is taken, units of the paper have"
-        f" {softest:g} to {stiffest:g}): rates of leaks and times of heat go with it, beyond their intervals"
-        f" ({mend})"
-    )
+        return []
+    return [
+        f"the wall's stiffness relative to the gas is not known (N = {model.wall_ratio:g} is assumed, units of the"
+        f" paper have {softest:g} to {stiffest:g}): rates of leaks and times of heat depend on it, and may lie outside"
+        f" their intervals ({mend})"
+    ]
 
 
-def limit_rejected(gained: Gain, beyond: str | None) -> str:
+def limit_rejected(gained: Gain, beyond: str | None) -> list[str]:
     """The sentence on an extension that is rejected; ``beyond``: how held-out loads exceed the fitted ones."""
+    if not gained.is_rejected:
+        return []
     low, high = gained.ci95
     least, most = (percent(-0.01 * bound) for bound in (high, low))
-    by = f"by {least.removesuffix(' %')} to {most}" if gained.is_certain else "which may be chance"
+    more = f"{least.removesuffix(' %')} to {most} more" if gained.is_certain else "which may be chance"
     why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
-    return (
-        f"on held-out data the extended model is worse than the baseline ({gained.rmse_before:.4g} to"
-        f" {gained.rmse_after:.4g} {gained.unit}, {by}): {why}; it is rejected, so that model and calibration are the"
-        " baseline's until such a recording is among those that are fitted"
-    )
+    return [
+        f"on held-out data the extended model is worse than the baseline (error {gained.rmse_after:.4g} instead of"
+        f" {gained.rmse_before:.4g} {gained.unit}, {more}): {why}; it is rejected, so that model and calibration are"
+        " the baseline's (fit a recording like the held-out ones, too)"
+    ]
 
 
-def limit_held_out_excess(off: float, within: float, beyond: str | None) -> str:
+def limit_held_out_excess(off: float, within: float, beyond: str | None) -> list[str]:
     """The sentence on recordings that were not fitted and are ``off`` by far more than fitted ones (``within``)."""
+    if not off:
+        return []
     why = beyond or (
-        "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
-        " changed, or the model follows the fitted ones for a wrong reason"
+        "their loads are no faster, higher or longer, so that they are of another unit or a changed one, or the model"
+        " fits for a wrong reason"
     )
-    return f"held-out recordings are off by {percent(off)} of full scale, fitted ones by {percent(within)}: {why}"
+    return [f"held-out recordings are off by {percent(off)} of full scale, fitted ones by {percent(within)}: {why}"]
 
 
-def limit_zero_drifted(zero: Zero, scale: Scale) -> str:
+def limit_zero_drifted(zeros: Sequence[Zero], scale: Scale) -> list[str]:
     """The sentence on an offset that may be a drift which began before the recordings."""
-    value = zero.value * scale.reading
-    return (
-        f"the zero is at {value:.3g} {scale.unit.symbol} where the recordings begin, and drifts that way: the drift may"
-        " have begun before, or there is an offset as well (record from where the unit is switched on)"
-    )
+    return [
+        f"the zero is at {zero.value * scale.reading:.3g} {scale.unit.symbol} where the recordings begin, and drifts in"
+        " that direction: the drift may have begun before, or there is an offset as well (record from the moment at"
+        " which the unit is switched on)"
+        for zero in zeros
+        if zero.may_have_drifted
+    ]
 
 
-def limit_zero_extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
-    """The sentence on a zero that is extrapolated from loads at which the unit was never seen unloaded.
+def limit_zero_extrapolated(zeros: Sequence[Zero], scale: Scale, thresholds: Thresholds) -> list[str]:
+    """The sentence on a zero that is extrapolated from loads at which the unit was never seen unloaded."""
+    told = (one for one in zeros if one.extrapolated_from and not one.may_have_drifted)
+    return [_extrapolated(one, scale, thresholds) for one in told]
+
+
+def _extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) -> str:
+    """The sentence on one extrapolated ``zero``.
 
     If the unit is unloaded at some time, but not at the start, only its memory of earlier loads is unknown.
     """
@@ -267,41 +284,41 @@ def limit_zero_extrapolated(zero: Zero, scale: Scale, thresholds: Thresholds) ->
     if zero.extrapolated_from <= thresholds.standing:
         return (
             f"without load the reading is {value}: an offset, a tare, or what the unit remembers of loads before the"
-            " recordings, which this data cannot tell apart (record a rest before the first load)"
+            " recordings; this data cannot tell which (record a rest before the first load)"
         )
     return (
         f"extrapolated to no load from {percent(zero.extrapolated_from)} of full load, the reading is {value}: an"
-        " offset, a tare, what the unit does below such loads, or what it remembers of earlier ones, which this data"
-        " cannot tell apart (record a rest without load that the sensor can read)"
+        " offset, a tare, what the unit does below such loads, or what it remembers of earlier loads; this data cannot"
+        " tell which (record a rest without load that the sensor can read)"
     )
 
 
 def limit_curves_in_tare(
     zeros: Sequence[Zero], effects: Sequence[Effect], scale: Scale, thresholds: Thresholds
-) -> tuple[str, ...]:
+) -> list[str]:
     """The sentence on curves among ``effects`` whose full scale includes a tare.
 
     Over another range the same curve has other parameters: a parabola's distance from its chord goes with the square.
     """
     curves = [effect.name for effect in effects if effect.is_memoryless]
-    return tuple(
+    return [
         f"full scale is {scale.load_n:.4g} N of the load as logged, {(1.0 + tare.value) * scale.load_n:.4g} N without"
-        f" the tare: the parameters of the {listed(curves)} are of a curve over all of the former (take the tare off"
-        " the loads for those of the latter)"
+        f" the tare: the parameters of the {listed(curves)} are those of a curve over {scale.load_n:.4g} N (take the"
+        f" tare off the loads for those over {(1.0 + tare.value) * scale.load_n:.4g} N)"
         for tare in zeros
         if curves and tare.effect.shifts == "load" and abs(tare.value) > thresholds.standing
-    )
+    ]
 
 
-def limit_force_as_logged(zeros: Sequence[Zero], scale: Scale) -> tuple[str, ...]:
+def limit_force_as_logged(zeros: Sequence[Zero], scale: Scale) -> list[str]:
     """The sentence on the force of a calibration that was made with a load cell that has a tare."""
-    return tuple(
+    return [
         "a calibration gives the force as the load cell shows it,"
-        f" {abs(tare.value) * scale.load_n:.3g} N {'more' if tare.value < 0.0 else 'less'} than what presses (take the"
-        " tare off the loads for one that does not)"
+        f" {abs(tare.value) * scale.load_n:.3g} N {'more' if tare.value < 0.0 else 'less'} than what presses on the"
+        " unit (take the tare off the loads to calibrate by the latter)"
         for tare in zeros
         if tare.effect.shifts == "load"
-    )
+    ]
 
 
 def reason_tare_creeps(drift: Name, tare: Zero | None) -> str | None:
@@ -309,9 +326,8 @@ def reason_tare_creeps(drift: Name, tare: Zero | None) -> str | None:
     if tare is None:
         return None
     return (
-        f"{in_words(drift.effect.name)} moves the reading by {percent(drift.member.size)} of full scale,"
-        f" which a tare of {percent(tare.size)} may do by creeping, so that it is not named (zero the load cell, and"
-        " log a rest)"
+        f"{in_words(drift.effect.name)} moves the reading by {percent(drift.member.size)} of full scale, but is not"
+        f" named: a tare of {percent(tare.size)} may creep by as much (zero the load cell, and log a rest)"
     )
 
 
@@ -319,14 +335,14 @@ def limit_own_gains(gains: Sequence[OwnGain]) -> list[str]:
     """The sentence on recordings with gains of their own."""
     if not gains:
         return []
-    told = "all else is judged with this allowed for, and no model can predict the gain of another recording"
+    told = "all else is judged with this allowed for; no model can predict the gain of another recording"
     if changes := changes_of(gains):
-        return [f"the gain changes {_when(changes)}, as where a unit slips: {told}"]
+        return [f"the gain changes {_when(changes)}, for example because the unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
     return [
         f"each recording has a gain of its own, from {percent(low.share, signed=True)} in {low.recording} to"
-        f" {percent(high.share, signed=True)} in {high.recording} beside that of all, as where a unit is taken out and"
-        f" put back: {told} (leave the unit in place, or calibrate it each time)"
+        f" {percent(high.share, signed=True)} in {high.recording} relative to that of all, for example because the unit"
+        f" was taken out and put back: {told} (leave the unit in place, or calibrate it each time)"
     ]
 
 
@@ -342,8 +358,8 @@ def limit_own_zeros(zeros: OwnZeros | None, scale: Scale) -> list[str]:
 
     apart = percent(float(np.ptp(zeros.offsets)))
     return [
-        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}, {apart} of full"
-        " scale apart: this is allowed for here (zero the load cell and the sensor before each)"
+        f"by the extended model, each recording has a zero of its own, from {told(low)} to {told(high)}, {apart} of"
+        " full scale apart: this is allowed for here (zero the load cell and the sensor before each)"
     ]
 
 
@@ -352,10 +368,9 @@ def limit_zero_jumps(changes: Sequence[ZeroChange]) -> list[str]:
     if not changes:
         return []
     return [
-        f"the zero jumps, in shares of full scale, {_when(changes)}, as where a unit slips, water moves in a line or"
-        " the room warms:"
-        " jumps that are not seen may imitate any effect of the unit, so that none is more than half sure, and no model"
-        " can predict those of another recording"
+        f"the zero jumps, in shares of full scale, {_when(changes)}, for example because the unit slips, water moves in"
+        " a line or the room warms: jumps that are not seen may imitate any effect of the unit, so that none is more"
+        " than half sure; no model can predict the jumps of another recording"
     ]
 
 
@@ -374,14 +389,14 @@ def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
         return []
     effect, left, beside = found.nearest_law
     said = (
-        f"{in_words(effect.name)} alone follows most of what the baseline misses ({percent(left)} of full scale"
-        f" where it was fitted, {percent(beside)} with it)"
+        f"{in_words(effect.name)} alone explains most of what the baseline misses on the fitted data"
+        f" ({percent(left)} of full scale without it, {percent(beside)} with it), but is not named"
     )
     if left > thresholds.clear * thresholds.tolerable:
-        return [f"{said}, but too little in this data speaks for it against no effect at all, so that it is not named"]
+        return [f"{said}: too little in this data speaks for it against no effect at all"]
     return [
-        f"{said}, but so may small imperfections of many kinds, {percent(thresholds.imperfection)} each, so that it is"
-        f" not named: if this unit is better than that, set `material` to less than {percent(thresholds.material)}"
+        f"{said}: small imperfections of many kinds, {percent(thresholds.imperfection)} each, may do the same (if this"
+        f" unit is better than that, set `material` to less than {percent(thresholds.material)})"
     ]
 
 
@@ -397,6 +412,6 @@ def limit_refusals(found: Inference) -> list[str]:
     if found.refused:
         said.append(
             f"tried and not kept: {listed(dict.fromkeys(found.refused))} (of no help in predicting recordings or load"
-            " cycles that were left out in turn, or too small there to be trusted at the held-out loads)"
+            " cycles left out in turn, or too small there to be trusted at the held-out loads)"
         )
     return said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._aligned import Aligned, aligned, with_lags_removed
@@ -83,7 +84,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         *said_of_neighbours,
         *clocks.says,
         *said_of_length,
-        *(said for said in slow if said is not None),
+        *chain.from_iterable(slow),
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
         *excitation.limits(),
@@ -104,7 +105,7 @@ def _first_parts(clocks: Aligned, lengths: Sequence[int]) -> tuple[Aligned, list
     if not cut:
         return clocks, []
     said = (
-        f"loads as quick as these are not all fitted at once, {first_names(cut)}: what changes later is not seen (fit"
-        " shorter recordings, from early and from late)"
+        f"fast loads over so long a time are too many samples for one fit: {first_names(cut)} are used, and what"
+        " changes later is not seen (fit shorter recordings, from early and from late)"
     )
     return replace(clocks, recordings=recordings, usable=usable), [said]

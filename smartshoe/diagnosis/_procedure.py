@@ -360,21 +360,18 @@ def _limits_of_the_force(
     own_zero_offsets: OwnZeros | None,
 ) -> tuple[str, ...]:
     """What limits a calibration's force: loads beyond the fitted ones, effects that are not undone, zeros, gains."""
-    gained, elsewhere, thresholds = outcome.gained, outcome.elsewhere, given.thresholds
+    gained, thresholds = outcome.gained, given.thresholds
+    elsewhere = 0.0 if gained.is_rejected else outcome.elsewhere  # one of the two sentences is enough
     ways = loads_beyond_fit(given.sessions, given.scale, thresholds) if gained.is_rejected or elsewhere else None
     undone = extended if force.is_plain else force.model
     return (
-        *([limit_rejected(gained, ways)] if gained.is_rejected else []),
-        *(
-            [limit_held_out_excess(elsewhere, structures.within.size, ways)]
-            if elsewhere and not gained.is_rejected
-            else []
-        ),
+        *limit_rejected(gained, ways),
+        *limit_held_out_excess(elsewhere, structures.within.size, ways),
         *limit_force(force),
         *limit_clipped(force),
         *limit_latency_left(force),
         *([] if gained.is_rejected else limit_not_undone(undone, given.fine[0].conditions.step_s)),
-        *([] if force.is_plain else limit_drift_held(force, thresholds)),
+        *limit_drift_held(force, thresholds),
         *named.zero_limits,
         *limit_own_gains(found.own_gains),
         *limit_own_zeros(own_zero_offsets, given.scale),
@@ -388,13 +385,14 @@ def _limits_of_the_names(
     found: Inference, given: Prepared, named: NamedCauses, extended: ExtendedModel
 ) -> tuple[str, ...]:
     """What limits the names: effects that are no causes, models at the end of their range, refused effects."""
-    of_model = (
-        limit_relaxation_range(extended, given.sessions, given.thresholds),
-        limit_curve_range(extended, named.names),
-        limit_wall_ratio(extended, given.sessions, given.thresholds),
+    return (
+        *named.limits,
+        *limit_relaxation_range(extended, given.sessions, given.thresholds),
+        *limit_curve_range(extended, named.names),
+        *limit_wall_ratio(extended, given.sessions, given.thresholds),
+        *limit_nearest_law(found, given.thresholds),
+        *limit_refusals(found),
     )
-    near = limit_nearest_law(found, given.thresholds)
-    return (*named.limits, *(said for said in of_model if said is not None), *near, *limit_refusals(found))
 
 
 def _structure_where_fitted(

@@ -49,22 +49,22 @@ def spacing_of(time_s: Array, at_s: Array, longest_s: float, thresholds: Thresho
     return Spacing(after, is_even[after - 1] & (at_s <= time_s[-1]), step_s[after - 1] <= longest_s)
 
 
-def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> str | None:
-    """The sentence on stretches whose samples are more than ``longest_s`` apart, or None."""
+def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> list[str]:
+    """The sentence on stretches whose samples are more than ``longest_s`` apart."""
     if recording.is_uniform:
-        return None
+        return []
     time_s, step_s = recording.time_s, recording.sample_time_s
     at_s = np.arange(time_s[0], time_s[-1], step_s)
     good = usable & recording.sensor.present & recording.load.present
     spacing = spacing_of(time_s, at_s, longest_s, thresholds)
     slow = spacing.too_slow(good)
     if not slow.any():
-        return None
+        return []
     first, last = (ends[place] for ends, place in zip(runs_of(slow), (0, -1), strict=True))
     after = spacing.after[slow]
     apart_s = float(np.median(time_s[after] - time_s[after - 1]))
-    return (
-        f"{recording.label}: from {moment(float(at_s[first]))} to {moment(float(at_s[last - 1]))} s"
-        f" {percent(float(slow.mean()))} of it is not used: samples are {apart_s:.3g} s apart there, and fits that"
-        f" follow its load need one in {longest_s:.3g} s (log at one rate, or give that stretch as a file of its own)"
-    )
+    return [
+        f"{recording.label}: {percent(float(slow.mean()))} of it is not used, between {moment(float(at_s[first]))} and"
+        f" {moment(float(at_s[last - 1]))} s: samples are {apart_s:.3g} s apart there; to follow this load, fits need"
+        f" one every {longest_s:.3g} s (log at one rate, or give that stretch as a file of its own)"
+    ]

@@ -142,7 +142,7 @@ def sentence_of(
     """
     good = f"the baseline simulation is good to {percent(baseline.rmse)} of full scale on data it was not fitted to"
     if baseline.is_empty:
-        good = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
+        good = "no held-out data can be used, so that it is not known how good the baseline simulation is"
     left = "" if not_explained is None else f"; {not_explained}"
     by_all = percent(best.rmse)
     if verdict == "adequate":
@@ -158,7 +158,7 @@ def sentence_of(
         said = f"{good}, with each recording's own zero and clock allowed for; found in these: {named}"
     elif worse or best.rmse > baseline.rmse:
         how = "worse" if worse else "no better"
-        said = f"{good}; with {named} it is {how} there, good to {by_all}, and it stays as it is"
+        said = f"{good}; with {named} it is {how} there ({by_all}), so that the baseline is kept"
     else:
         said = f"{good}, and to {by_all} with {named}"
     return said if verdict == "explained" else f"{said}{left}"

@@ -62,15 +62,8 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
     surest = sorted(chosen.names, key=lambda one: -one.kind_probability)[:cycles]
     chosen = chosen.without(lambda one: None if one in surest else reason_few_cycles(one, cycles))
     clocks_disagree = limit_clocks_disagree(given.clocks, found.fit.model, given.sessions, thresholds)
-    clocks = [] if clocks_disagree is None else [effect for effect, _ in given.clocks]
+    clocks = [effect for effect, _ in given.clocks] if clocks_disagree else []
     names = tuple(one for one in chosen.names if one.effect not in clocks)
-    before = () if clocks_disagree is None else (clocks_disagree,)
-    drifted = tuple(limit_zero_drifted(one, given.scale) for one in zeros if one.may_have_drifted)
-    extrapolated = tuple(
-        limit_zero_extrapolated(one, given.scale, thresholds)
-        for one in zeros
-        if one.extrapolated_from and not one.may_have_drifted
-    )
     # An offset is constant: where the zero jumps within recordings there is none.
     kept = tuple(
         one
@@ -79,12 +72,17 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
             one.may_have_drifted or one.extrapolated_from or (found.zero_changes and one.effect.shifts == "reading")
         )
     )
-    chosen = NamedCauses(names, kept, (*before, *chosen.limits), chosen.unnamed_rms, (*drifted, *extrapolated))
+    chosen = NamedCauses(names, kept, (*clocks_disagree, *chosen.limits), chosen.unnamed_rms)
     chosen = chosen.without(
         lambda one: reason_tare_creeps(one, creeping_tare(kept, one.effect, one.member.size, thresholds))
     )
-    of_tare = limit_curves_in_tare(kept, [one.effect for one in chosen.names], given.scale, thresholds)
-    return replace(chosen, zero_limits=(*chosen.zero_limits, *limit_force_as_logged(kept, given.scale), *of_tare))
+    zero_limits = (
+        *limit_zero_drifted(zeros, given.scale),
+        *limit_zero_extrapolated(zeros, given.scale, thresholds),
+        *limit_force_as_logged(kept, given.scale),
+        *limit_curves_in_tare(kept, [one.effect for one in chosen.names], given.scale, thresholds),
+    )
+    return replace(chosen, zero_limits=zero_limits)
 
 
 def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepared) -> NamedCauses:
@@ -92,7 +90,7 @@ def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepa
     about = found.fit.model, given.sessions, given.thresholds
     unsure = [one for one in chosen.names if may_be_remembered(one, *about)]
     names = tuple(capped_at_half(one) if one in unsure else one for one in chosen.names)
-    return replace(chosen, names=names, limits=(*chosen.limits, *(limit_remembered(one) for one in unsure)))
+    return replace(chosen, names=names, limits=(*chosen.limits, *limit_remembered(unsure)))
 
 
 def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCauses:

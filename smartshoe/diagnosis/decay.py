@@ -103,8 +103,8 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
     aim = f" towards {plateau:.3g} {unit}" if plateau else ""
     says = (
         f"the {sensor.name} falls by {100 * lost:.3g} % in {float(t[-1]):.3g} s{begins}{aim}, with a time constant of"
-        f" {_duration(tau_s)}{counted}, {_course_says(course, order)}: a leak or a relaxation, which"
-        f" {'only a logged load tells apart' if standing == 'absent' else 'a load that stands still cannot tell apart'}"
+        f" {_duration(tau_s)}{counted}, {_course_says(course, order)}: a leak or a relaxation;"
+        f" {'only a logged load' if standing == 'absent' else 'no load that stands still'} can tell which"
     )
     return Decay(
         onset_s, tau_s, ci95_s, from_start_s, 100.0 * lost, float(t[-1]), plateau, order, order_ci95, course, says
@@ -231,7 +231,7 @@ def _duration(time_s: float) -> str:
 def _course_says(course: Course, order: float | None) -> str:
     """The law of the decay in words."""
     if course == "undecided" or order is None:
-        return "were it to fall to zero (too little is lost to say by which law)"
+        return "if it goes on to zero (too little of the fall is seen to show its law)"
     if course == "exponential":
         return "as one exponential"
-    return f"{course} than exponentially (its rate goes as the reading to the power {order:.2f})"
+    return f"{course} than exponentially (its rate is proportional to the reading to the power {order:.2f})"

@@ -50,22 +50,22 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
             return
         memory_s = view.thresholds.memory_s
         says = (
-            f"the reading does not follow the load: load explains {100 * max(explained, 0.0):.0f} % of its variance, a"
-            f" curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed; is this the unit that was"
-            " pressed?"
+            f"the reading does not follow the load: the load explains {100 * max(explained, 0.0):.0f} % of its"
+            f" variance, with a curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed for; is this"
+            " the unit that was pressed?"
         )
         if explained >= follows:
             says = (
-                f"the reading does not go with the load throughout: what is slow in the load explains"
-                f" {100 * explained:.0f} % of its variance, but what one half of the recording tells does not foretell"
-                " the other: were both recorded by one clock, and is this the unit that was pressed (of a slow one"
-                " record several steps of the load)?"
+                f"the reading does not follow the load throughout: the load explains {100 * explained:.0f} % of its"
+                " variance, but only by slow changes; the two do not rise and fall together, and a model of one half of"
+                " the recording does not predict the other half; were both recorded by one clock, and is this the unit"
+                " that was pressed? (of a slow unit record several steps of the load)"
             )
         if view.thresholds.clear * (moved_at_rest := _share_moved_at_rest(view)) > 1.0:
             says = (
-                f"the reading goes on while the load stands: {100 * moved_at_rest:.0f} % of its range is gone through"
-                f" more than {max(memory_s):g} s after the load's last move; whether it is the load's integral, a"
-                " slower unit or a drift cannot be told from so few levels (record several, each for a while)"
+                f"the reading goes on while the load stands: it moves by {100 * moved_at_rest:.0f} % of its range more"
+                f" than {max(memory_s):g} s after the load's last move; it may be the load's integral, a slower unit or"
+                " a drift, and so few levels cannot tell which (record several levels, each for a while)"
             )
         if _load_is_noise(view):
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"

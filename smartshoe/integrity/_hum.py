@@ -32,12 +32,12 @@ def hum(view: View, bad: Mask) -> Iterator[Finding]:
     for frequency_hz, amplitude in found:
         folded = aliases(frequency_hz, rate_hz, float(view.time_s[-1] - view.time_s[0]))
         origin = f" ({' or '.join(folded)})" if folded else ""
-        named.append(f"{frequency_hz:.4g} Hz{origin} with {percent(amplitude / view.span)}")
+        named.append(f"{frequency_hz:.4g} Hz{origin} with an amplitude of {percent(amplitude / view.span)}")
     yield Finding(
         "hum",
         np.ones(len(view.recording), dtype=bool),
-        f"a hum stands in the reading also while the load rests: at {', at '.join(named)} of its span; another"
-        " sampling rate would tell a folded line from a true one",
+        f"the reading has a hum also while the load rests: at {', at '.join(named)} of its span; a recording at another"
+        " sampling rate would tell a true frequency from an alias",
         lines_hz=tuple(frequency_hz for frequency_hz, _ in found),
     )
 

@@ -50,8 +50,8 @@ def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recordi
             "quantisation",
             np.ones(len(recording), dtype=bool),
             f"the load is quantised in steps of {signal.step:.4g} {channel.unit.symbol},"
-            f" {percent(signal.step / span)} of its span: it was drawn through the moments at which it goes from one"
-            f" to the next, and is known to half a step where it stands, an rms error of {percent(error / span)}",
+            f" {percent(signal.step / span)} of its span: between the moments at which it changes step it was"
+            f" interpolated; where it stands it is known to half a step only, an rms error of {percent(error / span)}",
             error=gain * error,
         )
     ]

@@ -55,7 +55,7 @@ def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts
     told = run_diagnosis(parts)
     assert ([one.name for one in told.causes], told.minor) == (["linear_leak"], ("delay",))
     (_, said) = told.limits
-    assert said.startswith("delay fits, but each reading was moved to the load's clock before")
+    assert said.startswith("delay fits, but is not named: each reading was shifted to the load's clock before")
 
 
 def test_of_two_effects_of_one_mechanism_the_surer_is_named_unless_the_other_is_no_departure(parts: Any) -> None:
@@ -76,8 +76,8 @@ def test_of_two_effects_of_one_mechanism_the_surer_is_named_unless_the_other_is_
             assert {one.name for one in told.causes} == {*named, "delay"} | (set() if is_departure else {other})
             one, surest = (name.replace("_", " ") for name in (other, *named))
             said = (
-                f"{one} fits, but it may be no more than the error of the equation of {surest} (both are friction), so"
-                " that it is not named"
+                f"{one} fits, but is not named: it may be no more than the error of the equation of {surest} (both are"
+                " friction)"
             )
             assert (said in told.limits) is is_departure
 
@@ -92,8 +92,8 @@ def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest
         assert [one.name for one in told.causes] == named
         other = "linear leak" if sure > 0.9 else "delay"
         said = (
-            f"{other} fits, but so few load cycles (1) cannot show more causes than there are cycles, so that it is"
-            " not named (repeat the cycles)"
+            f"{other} fits, but is not named: 1 load cycle cannot show more than 1 cause, and others are surer (repeat"
+            " the cycles)"
         )
         assert (said in told.limits) is (cycles == 1)
 

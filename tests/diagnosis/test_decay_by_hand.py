@@ -335,4 +335,4 @@ def test_a_course_is_told_with_its_order() -> None:
     assert "power 1.50" in _course_says("slower", 1.5)
     assert _course_says("slower", 1.5).startswith("slower than")
     for course, order in (("undecided", 1.0), ("slower", None), ("undecided", None)):
-        assert "too little is lost" in _course_says(course, order)  # type: ignore[arg-type]
+        assert "too little of the fall is seen" in _course_says(course, order)  # type: ignore[arg-type]

@@ -72,7 +72,7 @@ def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
         assert (found.before, found.whole) == tuple(force_error([seen], model) for model in (MODEL, bent))
         said = limit_force(found)
         assert (said == []) is is_run
-        assert is_run or "compensates by the baseline, and its twin simulates with the effects" in said[0]
+        assert is_run or "the calibration corrects by the baseline; its twin simulates with the effects" in said[0]
 
 
 def test_a_lag_is_not_undone_where_that_makes_more_of_the_noise_than_it_takes_off(one: Session) -> None:
@@ -88,7 +88,7 @@ def test_a_lag_is_not_undone_where_that_makes_more_of_the_noise_than_it_takes_of
         assert found.error.fitted_n < found.before.fitted_n
         said = limit_force(found)
         assert bool(said) is bool(left)
-        assert not left or said[0].startswith("the calibration does not undo sensor lag, which would make more of")
+        assert not left or said[0].startswith("the calibration does not correct sensor lag: that would amplify")
 
 
 @pytest.mark.parametrize(("held_out_n", "is_plain"), [(9.1, False), (9.3, True), (np.nan, False)])
@@ -103,7 +103,7 @@ def test_a_force_that_is_worse_on_what_is_held_out_is_the_plain_models(
     assert found.model is (MODEL if is_plain else bent)
     assert found.rejected == (extended if is_plain else None)
     assert found.error == (before if is_plain else extended)
-    told = "baseline's on held-out data (9 to 9.3 N): the calibration compensates by the baseline"
+    told = "worse than by the baseline (error 9.3 N instead of 9 N): the calibration corrects by the baseline"
     assert (told in str(limit_force(found))) is is_plain
 
 
@@ -120,7 +120,7 @@ def test_no_force_is_asked_of_samples_that_are_clipped(one: Session) -> None:
     assert force_error([seen], clipped).fitted_n > 10.0 * found.error.fitted_n  # with the clipped ones
     (said,) = limit_clipped(found)
     lost_share = np.mean(np.abs(MODEL.simulate(one.conditions) - seen.reading) >= STANDARD.tolerable)
-    assert said.startswith(f"errors of the force leave out {100.0 * lost_share:.2g} % of samples")
+    assert said.startswith(f"errors of the force leave out {100.0 * lost_share:.2g} % of the samples")
     assert limit_clipped(compensation([one], MODEL, MODEL, STANDARD)) == []
     # Nor do they move the zero, though the filter does not undo the clipping: without it the zero lies below.
     assert found.zero == pytest.approx(0.0, abs=1e-4)
@@ -169,10 +169,10 @@ def test_a_force_that_is_hardly_worse_decides_nothing(
 def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
     (said,) = limit_not_undone(late, 0.02)
-    late_by = "no compensator takes off the delay, since a stream of readings cannot be moved to another time"
+    late_by = "no compensator can correct the delay: a stream of readings cannot be moved to another time"
     assert said.startswith(late_by)
     (said,) = limit_not_undone(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
-    assert said.startswith("no compensator takes off the clock drift, since ")
+    assert said.startswith("no compensator can correct the clock drift: ")
     assert limit_not_undone(late.without("delay"), 0.02) == []
 
 
@@ -187,8 +187,7 @@ def test_a_drift_that_is_held_is_said_to_be(one: Session) -> None:
         return limit_drift_held(Compensation([one], model, nothing, nothing, nothing, undone_by), STANDARD)
 
     (said,) = told(drifting.held_after(200.0, ()))
-    assert "up to 200 s, the end of what was fitted, and holds it from then on" in said
-    assert "(zero drift by -4 %)" in said
+    assert "up to the end of the fitted data at 200 s: there it moves a full-scale force (zero drift by -4 %);" in said
     assert told(drifting) == []  # a cause is told as one, and goes on
     assert told(MODEL.with_part("zero_drift", 0.2 * drift).held_after(200.0, ())) == []  # hardly anything
     assert told(MODEL) == []
@@ -252,7 +251,7 @@ def test_a_spike_that_a_filter_remembers_is_told(name: str, remembers: bool) -> 
     found = compensation(fine, model, model, STANDARD)
     said = limit_unsound_readings(found, scale, STANDARD)
     assert len(said) == remembers
-    assert not remembers or said[0].startswith("a filter remembers samples that are no readings")
+    assert not remembers or said[0].startswith("a filter takes faulty samples, such as spikes, for loads")
     whole = prepare([clean], [sound | True], [False], scale, [1], STANDARD)
     assert limit_unsound_readings(replace(found, fine=whole), scale, STANDARD) == []
 

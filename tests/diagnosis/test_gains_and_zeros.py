@@ -257,7 +257,7 @@ def test_a_wall_that_conditions_slips_where_its_gain_changes_once_in_a_recording
         )
     found = diagnose(runs[:-1], hold_out=runs[-1:])
     assert {cause.name for cause in found.causes} == {"cycle_conditioning", "gas_compression"}
-    assert sum("as where a unit slips" in said for said in found.limits) == 1
+    assert sum("because the unit slips" in said for said in found.limits) == 1
     assert found.baseline is not None
     assert found.extended is not None
     assert found.extended.force_rmse_n < 0.5 * found.baseline.force_rmse_n

@@ -268,7 +268,7 @@ def test_a_bow_that_small_imperfections_could_add_up_to_is_told_and_named_of_bet
     found, of_better_units = diagnose(runs), diagnose(runs, material=1e-4)
     assert (found.verdict, found.causes) == ("unexplained", ())
     assert "no cause can be named from this data (see its limits)" in found.says
-    (said,) = [limit for limit in found.limits if "alone follows most of what the baseline misses" in limit]
+    (said,) = [limit for limit in found.limits if "alone explains most of what the baseline misses" in limit]
     curves = {in_words(one.name) for one in catalogue().values() if one.is_memoryless}
     assert any(said.startswith(name) for name in curves)
     assert of_better_units.verdict == "explained"

@@ -51,7 +51,7 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
     assert told.force_model == "with offset"
     assert parts.seen["_with_offset"][0][0] is MODEL  # the plain one's
     assert told.extended.force_rmse_n == 9.0
-    assert any("so the calibration compensates by the baseline, and its twin" in limit for limit in told.limits)
+    assert any("the calibration corrects by the baseline; its twin" in limit for limit in told.limits)
 
 
 @pytest.mark.parametrize(("apart", "has_own"), [(0.9, False), (1.1, True), (-1.1, True)])
@@ -89,7 +89,7 @@ def test_what_a_filter_would_make_of_spikes_is_said(parts: Any) -> None:
 
 
 def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
-    parts.wall_ratio = "no such wall"
+    parts.wall_ratio = ["no such wall"]
     assert run_diagnosis(parts).limits == ("limit", "no such wall")
     (model, sessions, thresholds), _ = parts.seen["limit_wall_ratio"]
     assert (model.names, model.noise) == (parts.found.fit.model.names, parts.off)  # what is left of the reading
@@ -99,11 +99,11 @@ def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
 def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     parts: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    parts.not_undone, parts.wall_ratio = ["not undone"], "no such wall"
+    parts.not_undone, parts.wall_ratio = ["not undone"], ["no such wall"]
     told = run_diagnosis(parts)
     assert told.limits == ("limit", "not undone", "no such wall")
     assert told.limits_of_the_force == ("not undone",)  # the wall is the model's
-    parts.wall_ratio = None
+    parts.wall_ratio = []
     (model, step_s), _ = parts.seen["limit_not_undone"]
     assert model.names == parts.found.fit.model.names
     assert step_s == 0.05
@@ -113,7 +113,7 @@ def test_what_no_compensator_takes_off_is_said_of_the_extended_model(
     )
     monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     (_, said, why) = run_diagnosis(parts).limits
-    assert "gives a worse force: on what was fitted it is off by 8.2 N, the baseline by 8 N" in said
+    assert "gives a worse force (error on the fitted data 8.2 N instead of 8 N by the baseline)" in said
     assert why == "not undone"  # and so is why: what a stream cannot undo is left in its force
     (model, _), _ = parts.seen["limit_not_undone"]
     assert model.names == parts.found.fit.model.names

@@ -222,12 +222,12 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
 def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged() -> None:
     good = "the baseline simulation is good to 10 % of full scale on data it was not fitted to"
     rest = "over all recordings 3.4 % repeats and is not explained"
-    worse = f"{good}; with delay it is worse there, good to 20 %, and it stays as it is"
+    worse = f"{good}; with delay it is worse there (20 %), so that the baseline is kept"
     assert _said("partly_explained", "delay", baseline=AFTER, best=BEFORE, worse=True) == f"{worse}; {rest}"
     chance = _said("partly_explained", "delay", baseline=AFTER, best=BEFORE)  # by no more than chance
     assert chance == f"{worse.replace('worse', 'no better')}; {rest}"
     nothing = Errors(np.zeros(0), np.zeros(0), math.nan)
-    unknown = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
+    unknown = "no held-out data can be used, so that it is not known how good the baseline simulation is"
     explained = f"{unknown}; what is fitted is explained by delay"
     assert _said("explained", "delay", baseline=nothing, best=nothing) == explained
     assert _said("partly_explained", "delay", baseline=nothing, best=nothing) == f"{explained}; {rest}"
@@ -241,7 +241,7 @@ def test_what_was_taken_out_again_is_said_once() -> None:
     found.refused = ("linear_leak", "delay", "linear_leak")
     (said,) = limit_refusals(found)
     assert said == (
-        "tried and not kept: linear leak, delay (of no help in predicting recordings or load cycles that were left out"
+        "tried and not kept: linear leak, delay (of no help in predicting recordings or load cycles left out"
         " in turn, or too small there to be trusted at the held-out loads)"
     )
     found.cancelling_names = ("rate_gain", "delay")
@@ -334,12 +334,14 @@ def _told(
     return cause
 
 
-@pytest.mark.parametrize(("kin", "said"), [((), ""), (("clock_drift", "sensor_lag"), "clock drift, sensor lag")])
+@pytest.mark.parametrize(
+    ("kin", "said"), [((), ""), (("clock_drift", "sensor_lag"), "clock drift and sensor lag, effects")]
+)
 def test_what_stands_beside_a_cause_and_is_of_its_kind_is_said(kin: tuple[str, ...], said: str) -> None:
     name: Any = SimpleNamespace(member=SimpleNamespace(kin=kin))
     told = _beside_kin(name)
     assert [one.value for one in told] == ([float(len(kin))] if kin else [])
-    assert all(one.says.startswith(f"the extended model has {said} beside it, of one kind with it") for one in told)
+    assert all(one.says.startswith(f"the extended model also has {said} of the same kind: ") for one in told)
 
 
 def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -400,12 +402,12 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
     named = "it is not sure, since other effects do as well; it is named because"
     size = (
-        f"{named} it is larger than all that is left, or than small imperfections and the errors of the laws beside it"
+        f"{named} it is larger than all that is left unexplained, or than small imperfections and errors of other laws"
     )
     assert doubt.says == size
     for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another
         doubt = _told(monkeypatch, exposed, is_sure=False, alone=effect(alone)).evidence[-1]
-        assert doubt.says == (f"{named} by itself it predicts best what is left out" if is_why else size)
+        assert doubt.says == (f"{named} by itself it predicts left-out data best" if is_why else size)
 
 
 def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -567,5 +569,7 @@ def test_a_model_gives_readings_as_they_are_logged() -> None:
 def test_small_imperfections_are_said_to_follow_no_more_than_they_add_up_to(left: float, is_small: bool) -> None:
     found: Any = SimpleNamespace(nearest_law=(effect("delay"), left, 0.3 * left))
     (said,) = limit_nearest_law(found, Thresholds())
-    assert said.startswith(f"delay alone follows most of what the baseline misses ({percent(left)} of full scale")
+    assert said.startswith(
+        f"delay alone explains most of what the baseline misses on the fitted data ({percent(left)} of"
+    )
     assert ("small imperfections" in said, "set `material`" in said) == (is_small, is_small)

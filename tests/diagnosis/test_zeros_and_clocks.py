@@ -339,25 +339,25 @@ def test_what_a_leak_or_heat_does_goes_with_how_stiff_the_wall_is_which_is_said_
     rms = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
     assert rms > 0.0
     for material, is_said in ((0.999 * rms, True), (1.001 * rms, False)):
-        assert (limit_wall_ratio(model, sessions, replace(STANDARD, material=material)) is not None) is is_said
+        assert (limit_wall_ratio(model, sessions, replace(STANDARD, material=material)) != []) is is_said
     sensitive = replace(STANDARD, material=0.999 * rms)
-    assert limit_wall_ratio(model, sessions, sensitive) == (
-        "how stiff the wall is beside the gas is not known (N = 1.6 is taken, units of the paper have 1.51 to 1.78):"
-        " rates of leaks and times of heat go with it, beyond their intervals (declare effective_area_m2)"
-    )
+    assert limit_wall_ratio(model, sessions, sensitive) == [
+        "the wall's stiffness relative to the gas is not known (N = 1.6 is assumed, units of the paper have 1.51 to"
+        " 1.78): rates of leaks and times of heat depend on it, and may lie outside their intervals (declare"
+        " effective_area_m2)"
+    ]
     for runs in ((declared, bare), (bare, declared)):
         told, scale = _sessions(*runs)
-        assert limit_wall_ratio(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is None
+        assert limit_wall_ratio(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) == []
     # An area that no wall has tells nothing, which is said even where it decides over nothing.
     told, scale = _sessions(_run(seed=1, effective_area_m2=1.0), bare)
     for thresholds in (sensitive, replace(STANDARD, material=0.4)):
-        said = limit_wall_ratio(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, thresholds)
-        assert said is not None
+        (said,) = limit_wall_ratio(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, thresholds)
         assert said.endswith(
-            "(mend effective_area_m2: the declared one makes an N beyond 1.02 to 50, which no tube has)"
+            "(correct effective_area_m2: the declared one gives an N outside 1.02 to 50, which no tube has)"
         )
     # Without either it decides over nothing.
-    assert limit_wall_ratio(MODEL.with_part("dead_band"), sessions, replace(STANDARD, material=1e-12)) is None
+    assert limit_wall_ratio(MODEL.with_part("dead_band"), sessions, replace(STANDARD, material=1e-12)) == []
 
 
 @pytest.mark.parametrize("declared", ["40 cm2", "nan", "0", "-0.004"])
@@ -392,14 +392,14 @@ def _late(lag_s: float, rate: float = 0.0) -> Recording:
     return Recording.from_arrays(time_s=TIME_S, force_n=FULL_N * PRESSED, pressure_mbar=FULL_MBAR * share, name="late")
 
 
-@pytest.mark.parametrize(("lag_s", "way"), [(0.6, "earlier"), (-0.6, "later")])
+@pytest.mark.parametrize(("lag_s", "way"), [(0.6, "lags"), (-0.6, "leads")])
 def test_a_reading_of_another_clock_is_moved_to_the_loads(lag_s: float, way: str) -> None:
     runs = [_late(lag_s), _run()]
     found = _told((lag_s, 0.0), (0.0, 0.0), runs)
     assert (found.parts, found.moved) == ((), {0})
     (said,) = found.says
     assert "late" in said
-    assert f"0.6 s {way}" in said
+    assert f"the reading {way} the load by 0.6 s" in said
     usable = found.usable[0]
     assert 0 < np.count_nonzero(~usable) <= 0.6 / STEP_S + 2  # no reading was taken for the time beyond its ends
     assert usable[0 if lag_s > 0 else -1]

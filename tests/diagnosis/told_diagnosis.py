@@ -80,7 +80,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         beyond=0.0,
         judged=1.0,
         off=0.05,
-        wall_ratio=None,
+        wall_ratio=[],
     )
 
     def structure(sessions: Any, residuals: Any, thresholds: Any, quick: Any = None) -> Any:

@@ -342,7 +342,7 @@ def test_a_walk_shares_the_delay_that_ramps_show() -> None:
     found = diagnose(runs, hold_out=[_ramps(0.25, seed=3)])
     (cause,) = [cause for cause in found.causes if cause.name == "delay"]
     assert cause.parameters["delay"].value == pytest.approx(0.25, abs=0.005)
-    assert not any("was moved" in said for said in found.limits)
+    assert not any("was shifted to" in said for said in found.limits)
 
 
 def test_a_drift_that_one_recording_tells_and_others_follow_is_one_cause() -> None:

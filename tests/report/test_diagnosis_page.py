@@ -102,7 +102,7 @@ def test_what_to_do_next_says_where_the_calibration_s_force_may_be_off(
     name: str, nothing: str, no_more: str, tmp_path: Path
 ) -> None:
     """A calibration is not said to need nothing more where a limit says by how many newtons it is off."""
-    off = "a calibration takes one zero for all recordings: so the force of u02h is off by 8.4 N (rms)"
+    off = "a calibration has one zero for all recordings: so the force of u02h is off by 8.4 N (rms)"
     of_data = "one loading rate only: nothing can be said of rate dependence"
 
     def told(*limits: str) -> str:

@@ -84,7 +84,7 @@ def test_the_terminal_tells_what_parameters_are_and_what_likelihood_is(
 
 
 def test_where_the_force_may_be_off_stands_apart_from_other_limits(capsys: pytest.CaptureFixture[str]) -> None:
-    off = "no compensator takes off the delay"
+    off = "no compensator can correct the delay"
     print_diagnosis(replace(case("one cause"), limits=("one rate only", off), limits_of_the_force=(off,)))
     said = capsys.readouterr().out
     assert f"\nwhere the calibration's force may be off\n- {off}\n" in said
