@@ -21,8 +21,8 @@ from smartshoe.integrity.thresholds import Thresholds
 class ResidualStructure:
     """The structure of a residual, shares of full scale, by three tests of lack of fit.
 
-    ``repeating``, ``slow`` and ``predicted`` are the tests. ``memory`` describes the slow part: where it is noise it is no structure,
-    however slow. ``says`` where the structure is largest. ``size`` is all that exceeds white noise.
+    ``repeating``, ``slow`` and ``predicted`` are the tests. ``memory`` describes the slow part: where it is noise it is
+    no structure, however slow. ``says`` where the structure is largest. ``size`` is all that exceeds white noise.
     """
 
     repeating: LackOfFit
