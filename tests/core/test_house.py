@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
@@ -78,3 +79,12 @@ def test_a_private_module_is_imported_by_its_room_alone() -> None:
             if last.startswith("_") and not f"{name}.".startswith(f"{room}."):
                 strangers.append(f"{name} -> {module}")
     assert strangers == []
+
+
+@pytest.mark.parametrize("room", ["diagnosis", "integrity"])
+def test_each_file_of_a_large_room_has_its_place_in_the_architecture(room: str) -> None:
+    """And no file that is gone has one."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = text.split(f"| step of `{room}/` | files |", 1)[1].split("\n\n", 1)[0]
+    files = {path.stem.lstrip("_") for path in (ROOT / "smartshoe" / room).glob("*.py")} - {"init__"}
+    assert set(re.findall(r"`(\w+)`", table)) == files
