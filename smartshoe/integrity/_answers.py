@@ -14,6 +14,7 @@ from smartshoe.arrays import Array
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.signals.lags import left_by
 
 
 def answered_s(view: View, width_s: float) -> float | None:
@@ -48,8 +49,7 @@ def _innovations(values: Array, thresholds: Thresholds) -> Array:
     """
     few, shifted = thresholds.few, values - values.mean()
     past = np.stack([shifted[few - 1 - k : shifted.size - 1 - k] for k in range(few)], axis=1)
-    past = np.concatenate([past, np.ones((past.shape[0], 1))], axis=1)
-    errors = shifted[few:] - past @ np.linalg.lstsq(past, shifted[few:], rcond=None)[0]
+    errors = left_by(np.column_stack([past, np.ones(len(past))]), shifted[few:])
     clipped = cut_short(errors, thresholds)
     return np.asarray(clipped - clipped.mean())
 

@@ -21,11 +21,11 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._answers import answered_s, in_bins
 from smartshoe.integrity._fault import Finding, OneClock
-from smartshoe.integrity._following import share_regressors
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
+from smartshoe.signals.lags import share_regressors
 from smartshoe.signals.masks import runs_of
 
 # Resolutions: half and twice of each changed no finding in two cases.

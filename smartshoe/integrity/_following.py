@@ -8,7 +8,7 @@ explained by chance, but does not move along. A slow unit may answer changes of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from smartshoe.integrity._plain_unit import delays_of, plain_units, squares_left
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.signals.lags import lagged
+from smartshoe.signals.lags import left_by, share_regressors
 
 RISES_WITH_LOAD = ("pressure", "force")
 
@@ -172,13 +172,13 @@ def _followed_share(view: View) -> tuple[float, float]:
     if np.ptp(load) == 0.0:
         return 0.0, 0.0
     curve = np.interp(load, view.curve[0], view.curve[1])
-    columns = np.concatenate(
-        [load_regressors(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1
-    )
+    share = (load - load.min()) / np.ptp(load)
+    of_load = share_regressors(share, width * view.step_s, view.thresholds.memory_s)
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
     if _is_monotone(load, view.thresholds):
         base = base[:, :1]
-    base_residual, full_residual = _residual(reading, base), _residual(reading, np.concatenate([base, columns], axis=1))
+    full = np.column_stack([base, of_load, curve])
+    base_residual, full_residual = (left_by(columns, reading) for columns in (base, full))
     total = float(np.dot(base_residual, base_residual))
     if total == 0.0:
         return 0.0, 0.0
@@ -198,11 +198,6 @@ def _is_monotone(load: Array, thresholds: Thresholds) -> bool:
     return off < thresholds.standing * load.size
 
 
-def _residual(signal: Array, columns: Array) -> Array:
-    """(n,) what the least-squares fit of ``columns`` (n, k) leaves of a ``signal`` (n,)."""
-    return signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
-
-
 def _correlation_of_increments(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
     """Correlation of the increments of both (n,) over ``stride`` points, less what chance reaches in so few points.
 
@@ -214,14 +209,3 @@ def _correlation_of_increments(load: Array, reading: Array, stride: float, thres
     if norm == 0.0:
         return 0.0
     return float(np.dot(d_load, d_reading) / norm - thresholds.clear / np.sqrt(load.size / lag))
-
-
-def load_regressors(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
-    """(n, 3 + k) what a unit may make of its ``load`` (n,): its share of the span, squared, cubed, behind k lags."""
-    return share_regressors((load - load.min()) / np.ptp(load), step_s, time_constants_s)
-
-
-def share_regressors(share: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
-    """(n, 3 + k) a ``share`` (n,) of the load's span, its square and cube, and it behind k first-order lags."""
-    lags = [lagged(share, step_s, float(tau_s)) for tau_s in time_constants_s]
-    return np.stack([share, share**2, share**3, *lags], axis=1)
