@@ -18,8 +18,7 @@ from smartshoe.signals.masks import bridged
 def neighbours_of(recording: Recording) -> list[Channel]:
     """The readings of units other than the one that is diagnosed."""
     quantity = recording.sensor.unit.quantity
-    others = (one for one in recording.of_role("auxiliary") if one.unit.quantity == quantity)
-    return [one for one in others if one.name != "reference" and one.present.any()]
+    return [one for one in recording.of_role("auxiliary") if one.unit.quantity == quantity and one.present.any()]
 
 
 def with_one_neighbour(
