@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
-from smartshoe.signals.lags import lagged
+from smartshoe.signals.lags import lagged, left_by
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,23 +137,14 @@ def _fades(found: Branches, thresholds: Thresholds) -> bool:
         return False
     moved = np.maximum.accumulate(np.where(still, 0, np.arange(still.size)))
     ups, downs, mean = (np.interp(strokes.load, found.place, one) for one in (found.ups, found.downs, found.mean))
-    branches = [np.where(strokes.rate[moved] > 0.0, ups, downs), mean]
-    faded = [
-        _line_of(
-            np.column_stack([strokes.load, lagged(strokes.load, found.recording.sample_time_s, memory_s)]), strokes
-        )
+    by_branches = [strokes.reading - one for one in (np.where(strokes.rate[moved] > 0.0, ups, downs), mean)]
+    step_s, plain = found.recording.sample_time_s, [np.ones(still.size), strokes.load]
+    by_fading = [
+        left_by(np.column_stack([*plain, lagged(strokes.load, step_s, memory_s)]), strokes.reading)
         for memory_s in thresholds.memory_s
     ]
-    of_branches, of_faded = (
-        min(float(np.var((strokes.reading - one)[still])) for one in some) for some in (branches, faded)
-    )
-    return thresholds.clear * of_faded < of_branches
-
-
-def _line_of(columns: Array, strokes: _Strokes) -> Array:
-    """(n,) the best linear combination of columns (n, k) and a constant for the reading."""
-    with_constant = np.column_stack([np.ones(len(columns)), columns])
-    return np.asarray(with_constant @ np.linalg.lstsq(with_constant, strokes.reading, rcond=None)[0])
+    of_branches, of_fading = (min(float(np.var(one[still])) for one in some) for some in (by_branches, by_fading))
+    return thresholds.clear * of_fading < of_branches
 
 
 def _friction(found: Branches, thresholds: Thresholds) -> str | None:

@@ -7,19 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Mask
 from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Channel, Recording
-from smartshoe.signals.lags import lagged
+from smartshoe.signals.lags import lagged, left_by
 from smartshoe.signals.masks import bridged
 
 
 def neighbours_of(recording: Recording) -> list[Channel]:
     """The readings of units other than the one that is diagnosed."""
     quantity = recording.sensor.unit.quantity
-    others = (one for one in recording.of_role("auxiliary") if one.unit.quantity == quantity)
-    return [one for one in others if one.name != "reference" and one.present.any()]
+    return [one for one in recording.of_role("auxiliary") if one.unit.quantity == quantity and one.present.any()]
 
 
 def with_one_neighbour(
@@ -73,13 +72,7 @@ def _neighbour_sums(recording: Recording, neighbour: Channel, usable: Mask, thre
     load_terms = np.column_stack([np.ones(force.size), force, force**2, *behind])[mask]
     reading, other = sensor.values[mask], neighbour.in_unit(sensor.unit)[mask]
     with_neighbour = np.column_stack([np.ones(other.size), other])
-    left, other_left = _residuals(load_terms, reading), _residuals(load_terms, other)
+    left, other_left = left_by(load_terms, reading), left_by(load_terms, other)
     # Compared with the noise beyond the load's prediction, since fast loads bend a reading as noise does.
-    is_copy = float(np.std(_residuals(with_neighbour, reading))) < (1.0 - thresholds.same) * noise_sd(left, thresholds)
+    is_copy = float(np.std(left_by(with_neighbour, reading))) < (1.0 - thresholds.same) * noise_sd(left, thresholds)
     return _NeighbourSums(float(left @ other_left), float(other_left @ other_left), is_copy)
-
-
-def _residuals(columns: Array, values: Array) -> Array:
-    """(n,) residuals of ``values`` after least squares on ``columns``."""
-    scaled = columns / np.maximum(np.abs(columns).max(axis=0), 1e-300)
-    return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])

@@ -11,22 +11,25 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.integrity._scales import five_point_median
+from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.signals.lags import left_by
 
 
-def answered_s(time_s: Array, load: Array, reading: Array, width_s: float, thresholds: Thresholds) -> float | None:
-    """How late in s a ``reading`` (n,) answers its ``load`` (n,), to a bin of ``width_s``; None where it is uncertain.
+def answered_s(view: View, width_s: float) -> float | None:
+    """How late in s the reading answers its load, to a bin of ``width_s``; None where it is uncertain.
 
     It is certain where the largest correlation of innovations is beyond chance, and is larger by the factor `clear`
     than all others but the ``few`` beside it. A load that repeats itself has others; a step or two have none beyond
     chance.
     """
-    given = thresholds
+    given, time_s = view.thresholds, view.time_s
     bins = int((time_s[-1] - time_s[0]) / width_s)
     if bins < given.least_samples:
         return None
     grid = time_s[0] + (np.arange(bins) + 0.5) * width_s
-    innovations = [_innovations(binned(time_s, one, grid, width_s), given) for one in (load, reading)]
+    innovations = [_innovations(binned(time_s, one.values, grid, width_s), given) for one in (view.load, view.reading)]
     norms = [float(np.linalg.norm(one)) for one in innovations]
     if min(norms) == 0.0:
         return None
@@ -46,8 +49,7 @@ def _innovations(values: Array, thresholds: Thresholds) -> Array:
     """
     few, shifted = thresholds.few, values - values.mean()
     past = np.stack([shifted[few - 1 - k : shifted.size - 1 - k] for k in range(few)], axis=1)
-    past = np.concatenate([past, np.ones((past.shape[0], 1))], axis=1)
-    errors = shifted[few:] - past @ np.linalg.lstsq(past, shifted[few:], rcond=None)[0]
+    errors = left_by(np.column_stack([past, np.ones(len(past))]), shifted[few:])
     clipped = cut_short(errors, thresholds)
     return np.asarray(clipped - clipped.mean())
 
@@ -65,6 +67,16 @@ def _correlated(load: Array, reading: Array) -> Array:
     most = load.size // 4
     products = correlate(reading, load, mode="full", method="fft")
     return np.abs(products[load.size - 1 - most : load.size + most])
+
+
+def in_bins(view: View, samples: int) -> tuple[float, Array, Array, Array]:
+    """Even bins of ``samples`` at least: their width in s; (b,) their middles in s, load and reading without spikes."""
+    count = min(view.thresholds.bins, view.time_s.size // samples)
+    width_s = float(view.time_s[-1] - view.time_s[0]) / count
+    grid = view.time_s[0] + (np.arange(count) + 0.5) * width_s
+    both = (five_point_median(one.values) for one in (view.load, view.reading))
+    load, reading = (binned(view.time_s, one, grid, width_s) for one in both)
+    return width_s, grid, load, reading
 
 
 def binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:

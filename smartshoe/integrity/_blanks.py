@@ -50,7 +50,7 @@ def _pace_s(time_s: Array, channel: Channel, thresholds: Thresholds) -> float:
 def _interpolated_at(time_s: Array, channel: Channel, rows: Index, thresholds: Thresholds) -> Array:
     """(m,) a ``channel`` at the ``rows`` (m,) that remain, interpolated where it is blank between samples of its own.
 
-    Where these are more than two of its usual steps (`clear`) apart the channel was not there: it stays missing.
+    Where these are more than two and a quarter of its usual steps apart (`clear`, `same`) it stays missing.
     """
     own_s, at_s = time_s[channel.present], time_s[rows]
     if own_s.size < 2:

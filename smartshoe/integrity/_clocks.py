@@ -19,14 +19,13 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
-from smartshoe.integrity._answers import answered_s, binned
+from smartshoe.integrity._answers import answered_s, in_bins
 from smartshoe.integrity._fault import Finding, OneClock
-from smartshoe.integrity._following import share_regressors
-from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Recording
+from smartshoe.signals.lags import share_regressors
 from smartshoe.signals.masks import runs_of
 
 # Resolutions: half and twice of each changed no finding in two cases.
@@ -177,15 +176,10 @@ class _WindowLags:
 
 def _window_lags(view: View, smoothing: Sequence[float] = SMOOTHING) -> _WindowLags | None:
     """How late the reading follows, or None where that cannot be told; ``smoothing``: widths to try, in ``echo_s``."""
-    duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
-    if duration_s < given.hold_s:
+    if view.time_s[-1] - view.time_s[0] < given.hold_s:
         return None
-    bins = int(min(given.bins, view.time_s.size // 2))
-    width_s = duration_s / bins
-    grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
-    load = binned(view.time_s, five_point_median(view.load.values), grid, width_s)
-    reading = binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
+    width_s, grid, load, reading = in_bins(view, 2)
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
     for echoes in smoothing:  # the narrowest that the noise allows, since smoothing blunts the edges
@@ -286,7 +280,7 @@ def _is_answered_before(view: View, ends_s: Array, thresholds: Thresholds) -> bo
         return False
     least_s = float(np.min(np.abs(ends_s)))
     width_s = max(view.step_s, least_s / (thresholds.clear * thresholds.few))
-    answered = answered_s(view.time_s, view.load.values, view.reading.values, width_s, thresholds)
+    answered = answered_s(view, width_s)
     return answered is not None and thresholds.clear * abs(answered) < least_s
 
 

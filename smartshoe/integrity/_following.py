@@ -8,20 +8,19 @@ explained by chance, but does not move along. A slow unit may answer changes of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.integrity._answers import answered_s, binned, cut_short
+from smartshoe.integrity._answers import answered_s, cut_short, in_bins
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import frozen
 from smartshoe.integrity._plain_unit import delays_of, plain_units, squares_left, weights_of, without_past
-from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.signals.lags import lagged
+from smartshoe.signals.lags import left_by, share_regressors
 
 RISES_WITH_LOAD = ("pressure", "force")
 
@@ -111,7 +110,7 @@ def _answers_soon(view: View) -> bool:
     """
     for time_constant_s in view.thresholds.memory_s:
         width_s = max(view.step_s, time_constant_s / view.thresholds.few)
-        late_s = answered_s(view.time_s, view.load.values, view.reading.values, width_s, view.thresholds)
+        late_s = answered_s(view, width_s)
         if late_s is not None and 0.0 <= late_s <= max(time_constant_s, width_s):
             return True
     return False
@@ -125,23 +124,17 @@ def _is_foretold(view: View) -> bool:
     holds. Each half has an offset, a drift and a past of its own. A random course is often explained by chance, but
     what explains one half of it does not foretell the other: less than half of the squares (`clear`) must be left.
     """
-    given, duration_s = view.thresholds, float(view.time_s[-1] - view.time_s[0])
-    bins = min(given.bins, view.time_s.size)
-    step_s, middle = duration_s / bins, bins // 2
-    grid = view.time_s[0] + (np.arange(bins) + 0.5) * step_s
-    load, reading = (
-        binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
-    )
+    _, _, load, reading = in_bins(view, 1)
     if np.ptp(load) == 0.0:
         return False
     best = [(np.inf, np.inf, 0.0)] * 2  # of the unit told by either half: squares left there, in the other, and all
-    for lag, columns in plain_units(load, reading, delays_of(bins)):
-        first, second = (without_past(columns[half], lag) for half in (slice(0, middle), slice(middle, bins)))
+    for lag, columns in plain_units(load, reading, delays_of(load.size)):
+        first, second = (without_past(half, lag) for half in (columns[: load.size // 2], columns[load.size // 2 :]))
         for place, (one, other) in enumerate(((first, second), (second, first))):
             weights = weights_of(one)
             if (left := squares_left(one, weights)) < best[place][0]:
                 best[place] = left, squares_left(other, weights), float(np.sum(other[:, 2] ** 2))
-    return given.clear * sum(one[1] for one in best) < sum(one[2] for one in best)
+    return view.thresholds.clear * sum(one[1] for one in best) < sum(one[2] for one in best)
 
 
 def _share_moved_at_rest(view: View) -> float:
@@ -150,15 +143,11 @@ def _share_moved_at_rest(view: View) -> float:
     The beginning of each stretch is left out, for as long as laws remember a load.
     """
     given = view.thresholds
-    step_s = float(view.time_s[-1] - view.time_s[0]) / min(given.bins, view.time_s.size)
-    grid = np.arange(view.time_s[0] + 0.5 * step_s, view.time_s[-1], step_s)
-    load, reading = (
-        binned(view.time_s, five_point_median(one.values), grid, step_s) for one in (view.load, view.reading)
-    )
+    step_s, _, load, reading = in_bins(view, 1)
     standing_limit, largest, begin = given.standing * view.load_span, 0.0, 0
     settling = int(np.ceil(max(given.memory_s) / step_s))
-    for stop in range(1, grid.size + 1):
-        if stop == grid.size or abs(float(load[stop] - load[begin])) > standing_limit:
+    for stop in range(1, load.size + 1):
+        if stop == load.size or abs(float(load[stop] - load[begin])) > standing_limit:
             settled = reading[begin + settling : stop]
             if settled.size > 2 * given.few:
                 start, end = np.median(settled[: given.few]), np.median(settled[-given.few :])
@@ -183,13 +172,13 @@ def _followed_share(view: View) -> tuple[float, float]:
     if np.ptp(load) == 0.0:
         return 0.0, 0.0
     curve = np.interp(load, view.curve[0], view.curve[1])
-    columns = np.concatenate(
-        [load_regressors(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1
-    )
+    share = (load - load.min()) / np.ptp(load)
+    of_load = share_regressors(share, width * view.step_s, view.thresholds.memory_s)
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
     if _is_monotone(load, view.thresholds):
         base = base[:, :1]
-    base_residual, full_residual = _residual(reading, base), _residual(reading, np.concatenate([base, columns], axis=1))
+    full = np.column_stack([base, of_load, curve])
+    base_residual, full_residual = (left_by(columns, reading) for columns in (base, full))
     total = float(np.dot(base_residual, base_residual))
     if total == 0.0:
         return 0.0, 0.0
@@ -209,11 +198,6 @@ def _is_monotone(load: Array, thresholds: Thresholds) -> bool:
     return off < thresholds.standing * load.size
 
 
-def _residual(signal: Array, columns: Array) -> Array:
-    """(n,) what the least-squares fit of ``columns`` (n, k) leaves of a ``signal`` (n,)."""
-    return signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
-
-
 def _correlation_of_increments(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
     """Correlation of the increments of both (n,) over ``stride`` points, less what chance reaches in so few points.
 
@@ -225,14 +209,3 @@ def _correlation_of_increments(load: Array, reading: Array, stride: float, thres
     if norm == 0.0:
         return 0.0
     return float(np.dot(d_load, d_reading) / norm - thresholds.clear / np.sqrt(load.size / lag))
-
-
-def load_regressors(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
-    """(n, 3 + k) what a unit may make of its ``load`` (n,): its share of the span, squared, cubed, behind k lags."""
-    return share_regressors((load - load.min()) / np.ptp(load), step_s, time_constants_s)
-
-
-def share_regressors(share: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
-    """(n, 3 + k) a ``share`` (n,) of the load's span, its square and cube, and it behind k first-order lags."""
-    lags = [lagged(share, step_s, float(tau_s)) for tau_s in time_constants_s]
-    return np.stack([share, share**2, share**3, *lags], axis=1)

@@ -57,12 +57,12 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     if not _is_known(view, bottom) and (hidden <= least or not _noise_stands_still(view, tied, bottom, 1.0)):
         return
     is_loaded = tied & (view.load.values > view.curve[0][0] + view.thresholds.standing * view.load_span)
-    # The load at which readings leave the rail; where load and reading have changed places there is none.
     starts, stops = runs_of(tied)
     size = stops - starts
+    # The load at which readings leave the rail.
     leaves_n = float(np.median(view.load.values[stops[size >= min(view.thresholds.few, size.max())] - 1]))
     cut_off = "its zero is cut off"
-    if leaves_n > 0.0 and not view.is_swapped:
+    if leaves_n > 0.0:
         cut_off += f", and loads below about {leaves_n:.2g} N are not seen"
     yield Finding(
         "low_rail",

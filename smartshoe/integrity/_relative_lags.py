@@ -121,7 +121,7 @@ def own_lags_s(
     lags: Sequence[Lags],
     thresholds: Thresholds,
     told_s: Mapping[int, float],
-    shared: OneClock | None = None,
+    shared: OneClock | None,
 ) -> dict[int, float]:
     """By place, how much later in s the reading of a recording follows than those of the others; only where it does.
 
@@ -154,7 +154,7 @@ def own_clock(
     thresholds: Thresholds,
     near_s: float,
     near: OneClock,
-    shared: OneClock | None = None,
+    shared: OneClock | None,
 ) -> OneClock | None:
     """The clock of one recording relative to the ``others``, which predict it; None where it goes by theirs.
 

@@ -15,7 +15,7 @@ from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import robust_sd
 
 
-def short_recording(recording: Recording, thresholds: Thresholds, is_thinned: bool = False) -> Iterator[Finding]:
+def short_recording(recording: Recording, thresholds: Thresholds, is_thinned: bool) -> Iterator[Finding]:
     """Kind ``short_recording``, fatal: too few samples to show anything, or over before a reading answers its load.
 
     ``is_thinned``: samples were left out, which other findings tell.
@@ -94,11 +94,11 @@ def uneven_sampling(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
     typical = float(np.quantile(away, 1.0 - thresholds.faulty_share))
     if typical <= thresholds.same:
         return
-    at = np.concatenate([[False], away > thresholds.same])
+    is_uneven = away > thresholds.same
     yield Finding(
         "uneven_sampling",
-        at,
-        f"the sampling step varies: {percent(float(at.mean()))} of the steps differ from the usual"
+        np.concatenate([[False], is_uneven]),
+        f"the sampling step varies: {percent(float(is_uneven.mean()))} of the steps differ from the usual"
         f" {usual:.4g} s by more than {100 * thresholds.same:.0f} %"
         f" (from {float(step.min()):.3g} to {moment(float(step.max()), 3)} s)",
     )

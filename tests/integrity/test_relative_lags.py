@@ -63,7 +63,7 @@ def _lags_s(
     found = own_lags_s(fitted_ones, lags or (UNSEEN,) * len(runs), STANDARD, told_s or {}, shared)
     for place, run in compared.items():
         if place >= count and fitted_ones:
-            by = own_clock(run, [*fitted_ones.values()], STANDARD, 0.0, NO_LAG)
+            by = own_clock(run, [*fitted_ones.values()], STANDARD, 0.0, NO_LAG, None)
             found |= {} if by is None else {place: by.before_s}
     return found
 
