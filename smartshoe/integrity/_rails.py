@@ -64,11 +64,12 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     cut_off = "its zero is cut off"
     if leaves_n > 0.0:
         cut_off += f", and loads below about {leaves_n:.2g} N are not seen"
+    there, when = (is_loaded, "while the load is on") if is_loaded.any() else (tied, "at rest")
     yield Finding(
         "low_rail",
         view.whole(is_loaded),
-        f"{int(is_loaded.sum())} readings are exactly {view.sign * bottom:.6g} {view.recording.sensor.unit.symbol}"
-        f" while the load is on: the sensor cannot go lower, so that {cut_off}",
+        f"{int(there.sum())} readings are exactly {view.sign * bottom:.6g} {view.recording.sensor.unit.symbol} {when}:"
+        f" the sensor cannot go lower, so that {cut_off}",
         masks=True,
         cut_off=view.whole(tied & ~is_loaded),
         rail=view.sign * bottom,

@@ -180,6 +180,15 @@ def test_where_a_sensor_ends_in_one_recording_it_ends_in_the_others() -> None:
     assert found.refusals == ()
     assert np.array_equal(found.usable[1], rested.sensor.values > 6.0)
     assert 3 * found.usable[1].sum() < len(rested)
+    # Of one that leaves its end at once under load, the readings at rest are told.
+    pressed = np.tile(np.repeat([0.0, 300.0, 0.0, 500.0], 150), 6)
+    steps = Recording.from_arrays(
+        time_s=one.sample_time_s * np.arange(pressed.size), force_n=pressed,
+        pressure_mbar=np.where(pressed > 0.0, 0.15 * pressed + 0.01 * np.sin(np.arange(pressed.size)), 6.0),
+    )  # fmt: skip
+    found = examine([with_reading(one, np.maximum(one.sensor.values, 6.0)), steps])
+    (said,) = [fault.says for fault in found.faults if (fault.kind, fault.recording) == ("low_rail", 1)]
+    assert said.startswith(f"{np.sum(pressed == 0.0)} readings are exactly 6 mbar at rest: the sensor cannot go lower")
     high, cut = recorded(dynamic_protocol(), 4), recorded(dynamic_protocol((200.0, 760.0)), 5)
     top = 0.94 * float(high.sensor.values.max())
     both = [with_reading(run, np.minimum(run.sensor.values, top)) for run in (high, cut)]
