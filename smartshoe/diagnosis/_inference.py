@@ -42,7 +42,6 @@ from smartshoe.diagnosis._settling import (
     settled,
     simpler,
     simpler_from,
-    simpler_from_single_effects,
 )
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, state_at
 from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
@@ -209,7 +208,7 @@ def _settled_from(initial: State, progress: Progress) -> State:
         state = simpler_from(with_another_pole(state), state, progress)
     if state.fit.model.relaxing_share < 0.0:
         state = simpler_from(with_creeping_arm(state), state, progress)
-    return simpler_from_single_effects(initial, state, progress)
+    return state
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +299,7 @@ def _best_by_single_changes(
 ) -> tuple[_Validated, tuple[Member, ...]]:
     """The best set that changes of one member or one law reach from ``found``, and its members."""
     while True:
-        found, members = _without_redundant(found, plain)
+        members = found.members()
         removable = [one for one in members if one.name not in plain.model.names]  # clocks were found before any model
         for better in likelier_changes(found.fit, found.evidence, removable):
             progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
@@ -321,33 +320,6 @@ def _is_likelier(other: _Validated, found: _Validated) -> bool:
         return False
     new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
-
-
-def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple[Member, ...]]:
-    """``found`` without effects that another effect of their family makes immaterial, and its members.
-
-    For example a lag and a delay, of which either suffices: side by side each is too small to be named.
-    """
-    members = found.members()
-    while (redundant := _redundant(members, plain, found.evidence.thresholds)) is not None:
-        refitted = fit(found.fit.likelihood, redundant.without.model)
-        evidence, best = evidence_about(refitted.model, found.evidence)
-        found = replace(found, fit=refitted, evidence=evidence, best=best)
-        members = found.members()
-    return found, members
-
-
-def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) -> Member | None:
-    """The smallest immaterial effect that shares its family with another one and is not in the plain model."""
-    families = [one.effect.kind for one in members]
-    twice = [
-        one
-        for one in members
-        if one.size < thresholds.imperfection
-        and families.count(one.effect.kind) > 1
-        and one.name not in plain.model.names
-    ]
-    return min(twice, key=lambda one: one.size, default=None)
 
 
 def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from smartshoe.diagnosis._arms import arms_of, effect_count, latency_with_usual_arm, with_arm, with_odds
+from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, best_additions
@@ -13,7 +13,6 @@ from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, state_at
 from smartshoe.diagnosis._validation import error_of, rms_difference
 from smartshoe.models.effects import listed
-from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 
 Progress = Callable[[str], None]
@@ -70,28 +69,6 @@ def simpler_from(initial: State, state: State, progress: Progress) -> State:
     """The state that `settled` reaches from ``initial``, if it is simpler than ``state``; else ``state``."""
     other = settled(initial, progress, state)
     return state if other is state else replace(simpler(other, state), path=(*state.path, *other.path))
-
-
-def simpler_from_single_effects(initial: State, state: State, progress: Progress) -> State:
-    """The state settled from one of the best single effects, if it is simpler than ``state``, which has several.
-
-    Several effects, each fitted in part, may promise more in one linearisation than a single large one. A lag is also
-    tried beside a usual arm, since an arm can imitate a lag.
-    """
-    likelihood, fits = state.likelihood(), []
-    if effect_count(state.fit.model) - effect_count(initial.fit.model) > 1:
-        few = [
-            initial.evidence.posterior((*initial.fitted_members, k))
-            for k in best_additions(initial.evidence, initial.fitted_members, RIVALS)
-        ]
-        fits = [fit_of_set(initial, one, likelihood) for one in few]
-    if any(part.effect.is_latency or isinstance(part.effect, CoreEffect) for part in state.fit.model.parts):
-        fits.append(latency_with_usual_arm(initial))
-    one = min(fits, key=lambda one: one.cost, default=initial.fit)
-    if one is initial.fit or not _is_simpler(one, state):
-        return state
-    progress(f"beginning anew from {listed(one.model.names)}")
-    return simpler_from(state_at(one), state, progress)
 
 
 def simpler(other: State, state: State) -> State:

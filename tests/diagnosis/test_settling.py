@@ -146,56 +146,6 @@ def test_where_a_search_goes_round_the_fitted_set_with_most_evidence_is_taken(
         assert end.best.score == 0.0
 
 
-@pytest.mark.parametrize(
-    ("found", "likely", "one_is"), [("ab", True, True), ("ab", False, False), ("a", True, False), ("", True, False)]
-)
-def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several(
-    monkeypatch: pytest.MonkeyPatch, found: str, likely: bool, one_is: bool
-) -> None:
-    """Of the two likeliest alone the one that follows better; where fewer than two were found nothing is done."""
-    worth_of = {"x": 20.0, "y": 5.0}
-    begun: Any = SimpleNamespace(
-        fitted_members=(), linearisation=None,
-        fit=SimpleNamespace(model=SimpleNamespace(names=(), parts=(), relaxing_share=0.1)),
-        evidence=SimpleNamespace(posterior=lambda members: members[0]),
-    )  # fmt: skip
-    parts = tuple(SimpleNamespace(effect=effect("dead_band")) for _ in found)
-    model = SimpleNamespace(names=tuple(found), parts=parts, relaxing_share=0.1)
-    state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD)
-    said: list[str] = []
-    monkeypatch.setattr(_settling, "best_additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
-    monkeypatch.setattr(
-        _settling, "fit_of_set",
-        lambda state, one, likelihood: SimpleNamespace(cost=worth_of[one], model=SimpleNamespace(names=(one,))),
-    )  # fmt: skip
-    monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: likely)
-    monkeypatch.setattr(_settling, "state_at", lambda found: found.model.names)
-    monkeypatch.setattr(_settling, "simpler_from", lambda begun, state, progress: begun)
-    told = _settling.simpler_from_single_effects(begun, state, said.append)
-    assert told == (("y",) if one_is else state)
-    assert said == (["beginning anew from y"] if one_is else [])
-
-
-@pytest.mark.parametrize(
-    ("found", "is_tried"),
-    [("dead_band", False), ("delay", True), ("sensor_lag", True), ("second_relaxation", True), ("linear_leak", True)],
-)
-def test_a_lag_alone_is_tried_beside_a_usual_arm_where_anything_is_late_or_relaxes(
-    monkeypatch: pytest.MonkeyPatch, found: str, is_tried: bool
-) -> None:
-    """A single wrong effect about an arm that imitates a lag is no better than several."""
-    begun: Any = SimpleNamespace(fit=SimpleNamespace(model=SimpleNamespace(parts=(), relaxing_share=0.1)))
-    model = SimpleNamespace(parts=(SimpleNamespace(effect=effect(found)),), relaxing_share=0.1)
-    state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None)
-    late: Any = SimpleNamespace(cost=1.0, model=SimpleNamespace(names=("sensor_lag",)))
-    monkeypatch.setattr(_settling, "latency_with_usual_arm", lambda one: late)
-    monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: other is late)
-    monkeypatch.setattr(_settling, "state_at", lambda one: one.model.names)
-    monkeypatch.setattr(_settling, "simpler_from", lambda begun, state, progress: begun)
-    told: Any = _settling.simpler_from_single_effects(begun, state, lambda said: None)
-    assert told == (("sensor_lag",) if is_tried else state)
-
-
 @pytest.mark.parametrize(("names", "apart", "joins"), [("ba", 0.9, True), ("ba", 1.1, False), ("ac", 0.0, False)])
 def test_a_fit_that_comes_upon_a_known_way_ends_where_that_did(
     monkeypatch: pytest.MonkeyPatch, names: str, apart: float, joins: bool
