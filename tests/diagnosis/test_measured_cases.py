@@ -349,7 +349,7 @@ class TestSensors:
         found = diagnose(fitted[::2] if which == "three speeds" else fitted, hold_out=judges)
         assert [cause.effect.family for cause in found.causes] == ["static_curve"]
         assert found.causes[0].confidence <= 0.5
-        assert any("by itself it predicts best" in one.says for one in found.causes[0].evidence)
+        assert any("by itself it predicts left-out data best" in one.says for one in found.causes[0].evidence)
         assert found.verdict == "partly_explained"
         assert found.extended is not None
         assert found.extended.variance_explained_percent > 96.0
