@@ -199,17 +199,20 @@ def predicted_structure(sessions: Sequence[Session], residuals: Sequence[Array],
     which any sensor's lag is over, is fitted to one half of each recording and predicts the other, so that chance gains
     nothing. The score is that of the ratio of squares with and without it, in its logarithm, over blocks of ``hold_s``.
     """
-    designs = [_increments(one, thresholds.clear * thresholds.settled_s) for one in sessions]
-    halves = [_halves(one) for one in sessions]
+    parts = [
+        (one, _increments(one, thresholds.clear * thresholds.settled_s), residual, _halves(one))
+        for one, residual in zip(sessions, residuals, strict=True)
+        if one.fitted.any()
+    ]
     squares: list[tuple[float, float, int]] = []  # of each block: without, with, samples
     for fitted, other in ((0, 1), (1, 0)):
         gram, right = np.zeros((TAPS, TAPS)), np.zeros(TAPS)
-        for columns, residual, half in zip(designs, residuals, halves, strict=True):
+        for _, columns, residual, half in parts:
             rows = columns[half[fitted]]
             gram += rows.T @ rows
             right += rows.T @ residual[half[fitted]]
         weights = np.linalg.solve(gram + max(RIDGE * float(np.trace(gram)), 1e-300) * np.eye(TAPS), right)
-        for session, columns, residual, half in zip(sessions, designs, residuals, halves, strict=True):
+        for session, columns, residual, half in parts:
             width = max(round(thresholds.hold_s / session.conditions.step_s), 1)
             for at in np.split(half[other], range(width, half[other].size, width)):
                 left, predicted = residual[at], columns[at] @ weights
