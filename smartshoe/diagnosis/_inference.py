@@ -299,7 +299,7 @@ def _best_by_single_changes(
 ) -> tuple[_Validated, tuple[Member, ...]]:
     """The best set that changes of one member or one law reach from ``found``, and its members."""
     while True:
-        members = found.members()
+        found, members = _without_redundant(found, plain)
         removable = [one for one in members if one.name not in plain.model.names]  # clocks were found before any model
         for better in likelier_changes(found.fit, found.evidence, removable):
             progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
@@ -320,6 +320,33 @@ def _is_likelier(other: _Validated, found: _Validated) -> bool:
         return False
     new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
+
+
+def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple[Member, ...]]:
+    """``found`` without effects that another effect of their family makes immaterial, and its members.
+
+    For example a lag and a delay, of which either suffices: side by side each is too small to be named.
+    """
+    members = found.members()
+    while (redundant := _redundant(members, plain, found.evidence.thresholds)) is not None:
+        refitted = fit(found.fit.likelihood, redundant.without.model)
+        evidence, best = evidence_about(refitted.model, found.evidence)
+        found = replace(found, fit=refitted, evidence=evidence, best=best)
+        members = found.members()
+    return found, members
+
+
+def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) -> Member | None:
+    """The smallest immaterial effect that shares its family with another one and is not in the plain model."""
+    families = [one.effect.kind for one in members]
+    twice = [
+        one
+        for one in members
+        if one.size < thresholds.imperfection
+        and families.count(one.effect.kind) > 1
+        and one.name not in plain.model.names
+    ]
+    return min(twice, key=lambda one: one.size, default=None)
 
 
 def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,8 +15,11 @@ from smartshoe.diagnosis import _inference
 from smartshoe.diagnosis._inference import (
     _best_single,
     _is_likelier,
+    _redundant,
     _screening,
+    _Validated,
     _validated,
+    _without_redundant,
     independent_count,
     infer,
 )
@@ -62,7 +66,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
         unlikely=(), changeable=[], names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={},
-        best_single=None,
+        best_single=None, weighed=[],
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -101,6 +105,10 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         told.changeable.append([one.name for one in members])
         return iter([state(f"{change} {found.model}") for change in (told.changes.pop() if told.changes else ())])
 
+    def without_redundant(found: Any, given: Any) -> Any:
+        told.weighed.append((found.fit.model, given is plain))
+        return found, found.members()
+
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
     monkeypatch.setattr(
@@ -126,6 +134,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one: lawful if told.is_law else one)
     monkeypatch.setattr(_inference, "with_own_terms", lambda state, sessions: None)
     monkeypatch.setattr(_inference, "_validated", judged)
+    monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
     monkeypatch.setattr(_inference, "_best_single", lambda *given: told.best_single)
     monkeypatch.setattr(_inference, "_nearest_single_law", lambda *given: "nearest")
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
@@ -157,6 +166,15 @@ def test_what_can_be_left_out_in_one_way_only_validates_nothing(flow: Any, folds
     assert found.baseline is found.fit
 
 
+def test_what_is_told_is_without_what_another_effect_makes_immaterial(flow: Any) -> None:
+    """The first set, and each that a likelier one leads to; from the plain fit on."""
+    flow.infer()
+    assert flow.weighed == [("settled first", True)]
+    flow.weighed, flow.changes = [], [["law"], ["other"]]
+    flow.infer()
+    assert flow.weighed == [("settled first", True), ("other settled first", True), ("law other settled first", True)]
+
+
 def test_changes_are_tried_until_one_leads_to_a_likelier_set(flow: Any) -> None:
     flow.members, flow.changes = (_Sure(0.9),), [["c", "d"], ["a", "b"]]
     flow.unlikely = ("a settled first", "c b settled first", "d b settled first")
@@ -165,6 +183,75 @@ def test_changes_are_tried_until_one_leads_to_a_likelier_set(flow: Any) -> None:
     flow.plain.model.names, flow.changeable = ("member",), []  # a clock, told before any model
     flow.infer()
     assert flow.changeable == [[]]
+
+
+def _sized(name: str, size: float) -> Any:
+    return SimpleNamespace(effect=effect(name), name=name, size=size, without=SimpleNamespace(model=f"without {name}"))
+
+
+def test_of_two_of_a_family_the_smaller_is_redundant_where_it_is_immaterial() -> None:
+    """A lag and a delay; of a drift of the zero and a warming up that shift alike."""
+    small, most = 0.999 * STANDARD.imperfection, STANDARD.imperfection
+    plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
+
+    def redundant(*members: Any, known: tuple[str, ...] = ()) -> str | None:
+        plain.model.names = known
+        found = _redundant(members, plain, STANDARD)
+        return None if found is None else str(found.name)
+
+    lag, delay, leak = _sized("sensor_lag", small), _sized("delay", 0.5 * small), _sized("linear_leak", 1e-6)
+    assert redundant(lag, delay) == redundant(delay, lag) == "delay"
+    assert redundant(lag, leak) is None  # each alone of its family
+    assert redundant(_sized("sensor_lag", 0.01), _sized("delay", most)) is None
+    assert redundant(_sized("sensor_lag", 0.01), delay, leak) == "delay"
+    assert redundant(_sized("sensor_lag", 0.01), delay, known=("delay",)) is None  # a clock, told before any model
+    assert redundant(lag, delay, known=("delay",)) == "sensor_lag"
+    assert redundant() is None
+    plain.model.names = ()
+    assert _redundant((lag, delay), plain, replace(STANDARD, imperfection=0.4 * small)) is None
+    coarser = replace(STANDARD, material=0.5)  # what is asked for is no matter of what is there
+    assert _redundant((_sized("sensor_lag", 0.01), _sized("delay", most)), plain, coarser) is None
+
+
+def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    size = 0.5 * STANDARD.imperfection
+    sets = {
+        "whole": (_sized("delay", 0.01), _sized("sensor_lag", size), _sized("clock_drift", 0.5 * size)),
+        "without clock_drift": (_sized("delay", 0.01), _sized("sensor_lag", 2.1 * size)),
+    }
+    asked: list[Any] = []
+
+    def fit(likelihood: Any, model: Any) -> Any:
+        asked.append((likelihood, model))
+        return SimpleNamespace(model=model, likelihood=likelihood)
+
+    def about(model: Any, evidence: Any) -> Any:
+        return SimpleNamespace(thresholds=STANDARD, of=model, before=evidence.of), f"best of {model}"
+
+    monkeypatch.setattr(_inference, "fit", fit)
+    monkeypatch.setattr(_inference, "evidence_about", about)
+    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: sets[fit.model])
+    plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
+    first: Any = SimpleNamespace(thresholds=STANDARD, of="whole")
+    whole: Any = SimpleNamespace(model="whole", likelihood="likelihood")
+    begun = _Validated(first, "best", whole, ("refused",), ("undone",), True)  # type: ignore[arg-type]
+
+    def without() -> tuple[Any, Any]:
+        return _without_redundant(begun, plain)  # type: ignore[arg-type]
+
+    found, members = without()
+    assert asked == [("likelihood", "without clock_drift")]  # of what is left the lag is not immaterial any more
+    assert members == sets["without clock_drift"]
+    assert (found.fit.model, found.best) == ("without clock_drift", "best of without clock_drift")
+    assert (found.evidence.of, found.evidence.before) == ("without clock_drift", "whole")
+    assert (found.refused, found.cancelling_names, found.is_reduced) == (("refused",), ("undone",), True)
+    sets["without clock_drift"] = (_sized("delay", 0.01), _sized("sensor_lag", 0.9 * size))
+    sets["without sensor_lag"] = (_sized("delay", 0.01),)
+    found, members = without()
+    assert (found.fit.model, members) == ("without sensor_lag", sets["without sensor_lag"])
+    sets["whole"] = sets["without sensor_lag"]
+    found, members = without()
+    assert (found is begun, members) == (True, sets["whole"])
 
 
 def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
