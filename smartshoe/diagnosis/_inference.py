@@ -36,13 +36,7 @@ from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of
-from smartshoe.diagnosis._settling import (
-    Progress,
-    law_or_block,
-    settled,
-    simpler,
-    simpler_from,
-)
+from smartshoe.diagnosis._settling import Progress, law_or_block, settled, simpler, simpler_from
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, state_at
 from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
 from smartshoe.integrity.thresholds import Thresholds

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.diagnosis._sensitivity import ridged
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import NORMAL_QUARTILE, autocovariance
@@ -211,7 +212,7 @@ def predicted_structure(sessions: Sequence[Session], residuals: Sequence[Array],
             rows = columns[half[fitted]]
             gram += rows.T @ rows
             right += rows.T @ residual[half[fitted]]
-        weights = np.linalg.solve(gram + max(RIDGE * float(np.trace(gram)), 1e-300) * np.eye(TAPS), right)
+        weights = np.linalg.solve(ridged(gram, RIDGE), right)
         for session, columns, residual, half in parts:
             width = max(round(thresholds.hold_s / session.conditions.step_s), 1)
             for at in np.split(half[other], range(width, half[other].size, width)):

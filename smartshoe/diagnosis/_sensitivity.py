@@ -277,10 +277,10 @@ def _without_last(products: Array, count: int) -> Array:
     return np.asarray(products[:-count, :-count] - cross.T @ np.linalg.solve(ridged(last), cross))
 
 
-def ridged(inner: Array) -> Array:
-    """(k, k) inner products with a relative ridge of 1e-12, so that collinear columns can be solved for."""
+def ridged(inner: Array, share: float = 1e-12) -> Array:
+    """(k, k) inner products with a ridge of a ``share`` of their trace, so that collinear columns can be solved for."""
     held = inner.copy()
-    held.flat[:: inner.shape[0] + 1] += 1e-12 * max(float(np.trace(inner)), 1e-12)
+    held.flat[:: inner.shape[0] + 1] += share * max(float(np.trace(inner)), 1e-12)
     return held
 
 
