@@ -48,7 +48,7 @@ def cause_of(
     )
     by = None if law is None else law.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
-    sure = confidence_of(name, thresholds), name.law_probability
+    sure = confidence_of(name), name.law_probability
     return Cause(name.effect, *sure, name.equivalents, values, evidence, gained, member.size, rivals, member.name)
 
 

@@ -85,7 +85,10 @@ class Member:
 
 
 def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Member, ...]:
-    """The members of the set ``best``, largest first, each refitted without it and compared with alternatives."""
+    """The members of the set ``best``, largest first, each refitted without it and compared with alternatives.
+
+    A tare, which only rests name, is none of them.
+    """
     likelihood = extended.likelihood
     chosen, thresholds = [evidence.linearisation.candidates[member] for member in best.members], evidence.thresholds
     ended = [_is_at_end_of_kind(one.name, extended.model) for one in chosen]
@@ -98,6 +101,8 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
     present = excitation_of(likelihood.sessions, thresholds).tells_apart
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
+        if one.effect.shifts is not None:
+            continue
         is_there = sizes[k] > thresholds.imperfection
         shapes = _shapes_beside(best, member, evidence)
         laws = _other_laws(one, reduced[k], extended, shapes, is_at_end_of_kind=ended[k]) if is_there else ()

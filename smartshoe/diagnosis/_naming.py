@@ -92,9 +92,7 @@ def names_of(
         is_firm = not all(one.kind_only for one in sure)  # not beside a kind that no law follows
         max_departure = thresholds.departure * math.hypot(*(one.member.size for one in sure))
         companions = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
-        companions = [
-            one for one in companions if confidence_of(one, thresholds) > 0.5 or one.member.size > max_departure
-        ]
+        companions = [one for one in companions if confidence_of(one) > 0.5 or one.member.size > max_departure]
         return tuple(one for one in named if one in sure or one in companions)
     if larger := [one for one in possible if one.member.size > residual_rms]:
         return tuple(capped_at_half(one) for one in larger)
@@ -201,18 +199,13 @@ def probability_of_kind(one: Member, residual_rms: float, thresholds: Thresholds
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 
 
-def confidence_of(name: Name, thresholds: Thresholds) -> float:
+def confidence_of(name: Name) -> float:
     """The probability that it is what it is named, or one of its equivalents.
 
-    Higher than the odds where it is sure; at most one half where no law of the kind follows, since the law, or the
-    kind, may be one that the catalogue does not have.
+    At most one half where no law of the kind follows, since the law, or the kind, may be one that the catalogue does
+    not have.
     """
-    kind = name.kind_probability
-    if name.kind_only:
-        return min(kind, 0.5)
-    if not name.is_sure:
-        return kind
-    return kind / (kind + (1.0 - kind) * math.exp(-thresholds.named_odds))
+    return min(name.kind_probability, 0.5) if name.kind_only else name.kind_probability
 
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:

@@ -18,6 +18,7 @@ from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinni
 from smartshoe.diagnosis._sensitivity import logged_words
 from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.diagnosis._slow_stretches import limit_slow_stretches
+from smartshoe.diagnosis._zero import zeros_of
 from smartshoe.display import first_names
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
@@ -89,6 +90,9 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         *(said for said in said_of_curve if said is not None),
         *excitation.limits(),
     ]
+    seen = [one for one in zeros_of(sessions, start, scale, 0.0, 0.0, thresholds) if one.is_seen]
+    if tares := [one.effect.of_at_most(one.value) for one in seen if one.effect.shifts == "load"]:
+        sessions = [replace(one, tare=tares[0]) for one in sessions]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)

@@ -87,13 +87,15 @@ def available_effects(sessions: Sequence[Session], thresholds: Thresholds) -> li
     """Physical effects and flexible blocks that this data could show: their channels are logged in every recording.
 
     Left out are effects that shift load or reading by a constant, which no waveform distinguishes from a recording's
-    offset (`smartshoe.diagnosis._zero`), and effects of later load cycles where no recording has any. Relaxation of a
+    offset (`smartshoe.diagnosis._zero`), but for the tare that rests show: behind it other effects have other shapes.
+    Left out too are effects of later load cycles where no recording has any. Relaxation of a
     pressure is attributed to the gas; of other readings the sensor may be its cause, too.
     """
     has = logged_channels(sessions)
     has_cycles = have_later_cycles(sessions, thresholds)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
+    found += [one.tare for one in sessions[:1] if one.tare is not None]
     if any(one.without_gas_memory for one in sessions):
         found = [e for e in found if not is_remembered_by_gas(e)]
     if not any(one.recording.sensor.unit.quantity == "pressure" for one in sessions):

@@ -25,7 +25,7 @@ from smartshoe.diagnosis._load_cycles import cycles_of
 from smartshoe.diagnosis._rest import load_at_rest, with_level_rests
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
-from smartshoe.models.effects import Conditions
+from smartshoe.models.effects import Conditions, Effect
 from smartshoe.recording import Recording
 from smartshoe.signals.masks import runs_of
 
@@ -53,6 +53,7 @@ class Session:
     ``zero_sd``. ``gap_ends`` are the first samples after gaps with an unknown load that are long enough for the wall to
     creep. ``unknown_past``: the load that a unit at rest may still remember. ``white_sd`` is the standard deviation of
     the reading's white noise at the full rate. ``without_gas_memory``: effects by which a gas remembers are not sought.
+    ``tare``: the load cell's, of at most what rests show; None where they show none.
     """
 
     recording: Recording
@@ -73,6 +74,7 @@ class Session:
     unknown_past: float = 1.0
     white_sd: float = 0.0
     without_gas_memory: bool = False
+    tare: Effect | None = None
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:

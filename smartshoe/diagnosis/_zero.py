@@ -163,8 +163,8 @@ def _drift_at_rest(session: Session, model: ExtendedModel) -> Array:
 
 
 def _without_what_rests_show(model: ExtendedModel, *, but_for_drifts: bool = False) -> ExtendedModel:
-    """``model`` without the effects that a rest shows; ``but_for_drifts`` keeps those that go with time."""
-    at_rest = (part for part in model.parts if part.effect.is_seen_at_rest)
+    """``model`` without what a rest shows but a shift; ``but_for_drifts`` keeps effects that go with time."""
+    at_rest = (part for part in model.parts if part.effect.is_seen_at_rest and part.effect.shifts is None)
     return model.without(*(one.name for one in at_rest if not (but_for_drifts and one.effect.goes_with_the_clock)))
 
 

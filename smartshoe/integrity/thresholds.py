@@ -130,13 +130,6 @@ class Thresholds:
     least_confidence: float = threshold(
         0.75, "probability", "confidence from which on a kind is sure", "three to one for being right"
     )
-    named_odds: float = threshold(
-        0.5,
-        "log odds",
-        "log odds that a kind which is sure, and named, gains by that",
-        "1,489 names in two simulated worlds",
-        least=-math.inf,
-    )
     still_per_s: float = threshold(
         0.004, "full scales a second", "change of the load below which it is held", "3 N/s on 800 N"
     )

@@ -87,14 +87,10 @@ def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
 
 
 @given(st.floats(0.0, 1.0))
-def test_a_kind_that_is_sure_is_surer_for_being_named_by_the_same_odds(kind: float) -> None:
+def test_a_kind_is_as_sure_as_its_odds_and_one_half_at_most_without_a_law(kind: float) -> None:
     one = Name(member(), effect("linear_leak"), kind, 1.0, ())
-    named = confidence_of(one, STANDARD)
-    assert confidence_of(replace(one, is_sure=False), STANDARD) == kind
-    assert kind <= named <= 1.0
-    odds, before = (p / (1.0 - p) if p < 1.0 else math.inf for p in (named, kind))
-    assert odds == pytest.approx(before * math.exp(STANDARD.named_odds), rel=1e-6) or odds > 1e9
-    assert confidence_of(one, replace(STANDARD, named_odds=0.0)) == pytest.approx(kind)
+    assert confidence_of(one) == kind
+    assert confidence_of(replace(one, kind_only=True)) == min(kind, 0.5)
 
 
 # -- which kind -----------------------------------------------------------------------------------------------
@@ -135,7 +131,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family - {"gas_compression", "wall_hardening"}
-    assert name.kind_probability == probability_of_kind(name.member, 0.0, STANDARD) > confidence_of(name, STANDARD)
+    assert name.kind_probability == probability_of_kind(name.member, 0.0, STANDARD) > confidence_of(name)
     assert name.law_probability == pytest.approx(1.0 / (len(family) - 2))
     # Where all others follow less than half of it, no law is sure all the same: it may be none of the catalogue's.
     far = tuple((one, 900.0) for one in family - {"contact_area"})
@@ -235,7 +231,7 @@ def test_where_only_the_kind_is_known_the_name_is_half_sure_at_most_however_sure
         name = only(names_of([one], 0.03, STANDARD))
         assert name.kind_only
         kind = probability_of_kind(one, 0.03, STANDARD)
-        assert confidence_of(name, STANDARD) == min(kind, 0.5)
+        assert confidence_of(name) == min(kind, 0.5)
         sure.append((name.is_sure, kind > 0.5))
     assert {*sure} == {(True, True), (False, True), (False, False)}
 

@@ -328,7 +328,7 @@ def _told(
     if by is None and "linear_leak" in dict(laws):  # a law that the block is called by, near enough or not
         fitted = ("linear_leak's fit", "linear_leak")
     assert cause.parameters == {"of": (*fitted, SCALE)}
-    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, confidence_of(name, STANDARD), 0.6)
+    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, confidence_of(name), 0.6)
     assert (cause.equivalents, cause.size) == (equivalents, 0.0123)
     assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
     return cause

@@ -177,7 +177,6 @@ def test_where_nothing_is_asked_for_the_record_decides_as_it_is() -> None:
         ("local", 64.5, "a whole number of at least 4"),
         ("local", 1, "a whole number"),
         ("bins", 0, "a whole number"),
-        ("named_odds", "x", r"a number \("),
         ("memory_s", (0.3, "x"), "a number above 0"),
         ("memory_s", (0.0, 3.0), "a number above 0"),
         ("memory_s", (), "a tuple of numbers that rise"),

@@ -281,6 +281,14 @@ class Effect(ABC):
         """The effect for a reading that is no pressure: stress, or the conduction of a polymer, may fall in holds."""
         return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
 
+    def of_at_most(self, value: float) -> Effect:
+        """The effect, of one parameter, with bounds at null and at ``value``."""
+        (strength,) = self.parameters
+        null = strength.null or 0.0
+        variant = copy(self)
+        vars(variant).update(parameters=(replace(strength, lower=min(null, value), upper=max(null, value)),))
+        return variant
+
     def departs_by(self, values: Array) -> float:
         """By what share of itself the effect differs from a law, of a block that follows what no law does."""
         return 1.0
