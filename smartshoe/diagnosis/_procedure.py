@@ -40,6 +40,7 @@ from smartshoe.diagnosis._limits import (
 )
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
+from smartshoe.diagnosis._own_lags import own_lags
 from smartshoe.diagnosis._own_terms import own_terms_of, residual_of
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
@@ -50,7 +51,7 @@ from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._told_lines import as_thinned, lines_of, told_tones
-from smartshoe.diagnosis._validation import fitted_rms
+from smartshoe.diagnosis._validation import error_of, fitted_rms
 from smartshoe.diagnosis._verdict import (
     fault_rms,
     held_out_excess,
@@ -79,8 +80,15 @@ def diagnosed(
 ) -> Diagnosis:
     """The diagnosis of ``recordings``; the first ``count`` are fitted, the others are held out."""
     given = prepared(recordings, count, integrity, thresholds)
+    found = infer_with_gas_check(given.start, given.sessions, thresholds, progress, not given.is_no_unit)
+    if lags_s := own_lags(given.sessions, found.fit.model, thresholds):
+        progress("going through it again with each recording on one clock")
+        on_one_clock = integrity.with_lags(lags_s, is_in_model=bool(given.clocks))
+        again = prepared(recordings, count, on_one_clock, thresholds)
+        other = infer_with_gas_check(again.start, again.sessions, thresholds, progress, not again.is_no_unit)
+        if error_of(again.sessions, other.fit.model) < error_of(given.sessions, found.fit.model):
+            integrity, given, found = on_one_clock, again, other
     sessions, fine, scale = given.sessions, given.fine, given.scale
-    found = infer_with_gas_check(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     noise = noise_without_memory(given.fine, found.fit.model, integrity.faults, thresholds.material)
     structures = _structures_of(found, given, integrity.faults, noise)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -109,3 +110,12 @@ class Integrity:
     one_clock: OneClock | None
     refusals: tuple[str, ...]
     others: frozenset[int] = frozenset()
+
+    def with_lags(self, lags_s: Mapping[int, float], *, is_in_model: bool) -> Integrity:
+        """The same with readings that lag by ``lags_s`` more, by the recordings' places, and no clock that all share.
+
+        ``is_in_model``: the lags found before were left to a model, and are in those given.
+        """
+        before_s = (0.0,) * len(self.clock_offset_s) if is_in_model else self.clock_offset_s
+        offsets_s = tuple(offset_s + lags_s.get(place, 0.0) for place, offset_s in enumerate(before_s))
+        return replace(self, clock_offset_s=offsets_s, one_clock=None)

@@ -1,0 +1,82 @@
+"""Recordings whose readings lag by times of their own, too short to be seen before any model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._own_lags import own_lags
+from smartshoe.diagnosis._scale import full_scale
+from smartshoe.diagnosis._session import Session, prepare
+from smartshoe.models.effects import Conditions
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+STEP_S, FULL_N, FULL_MBAR = 0.02, 800.0, 140.0
+MODEL = ExtendedModel(1.0, 0.08, 0.22, FULL_N, FULL_MBAR, "mbar")
+TIME_S = np.arange(0.0, 60.0, STEP_S)
+
+
+def _late(name: str, lag_s: float, period_s: float, seed: int, **metadata: object) -> Recording:
+    """A unit under triangles, whose reading is later than its load; noise of 0.02 % of full scale."""
+    load = np.clip(np.abs((TIME_S / period_s + 0.5) % 1.0 - 0.5) * 4.0 - 0.6, 0.0, 1.0) * (TIME_S > 5.0)
+    share = MODEL.simulate(Conditions(TIME_S, load, STEP_S))
+    share = np.interp(TIME_S - lag_s, TIME_S, share) + 2e-4 * np.random.default_rng(seed).standard_normal(TIME_S.size)
+    return Recording.from_arrays(
+        time_s=TIME_S, force_n=FULL_N * load, pressure_mbar=FULL_MBAR * share, name=name, metadata=metadata
+    )
+
+
+def _sessions(*runs: Recording, held_out: int = 0) -> list[Session]:
+    usable = [one.sensor.present for one in runs]
+    scale = replace(full_scale(runs, usable, STANDARD), load_n=FULL_N, reading=FULL_MBAR)
+    held = [place >= len(runs) - held_out for place in range(len(runs))]
+    return prepare(runs, usable, held, scale, [1] * (len(runs) - held_out), STANDARD)
+
+
+lags = st.floats(-0.05, 0.05)
+
+
+@given(st.tuples(lags, lags, lags), st.integers(0, 99))
+def test_lags_that_differ_are_found_to_a_millisecond_and_others_are_none(
+    lags_s: tuple[float, float, float], seed: int
+) -> None:
+    """Triangles of 6 s move the reading by 0.5 full scales a second: 3 ms are what small imperfections do."""
+    runs = [_late(f"r{k}", lag_s, 6.0 + k, seed + k) for k, lag_s in enumerate(lags_s)]
+    found = own_lags(_sessions(*runs, held_out=1), MODEL, STANDARD)
+    apart_s = abs(lags_s[0] - lags_s[1])  # the last one is only judged, and tells nothing of the others
+    if apart_s > 0.012:
+        assert set(found) == {0, 1, 2}
+    elif apart_s < 0.002:
+        assert found == {}
+    if found:
+        assert [found[k] for k in range(3)] == pytest.approx(lags_s, abs=1e-3)
+
+
+def test_the_models_delay_is_a_part_of_each_lag_since_the_clocks_may_have_made_it() -> None:
+    runs = [_late("early", 0.01, 6.0, 1), _late("late", 0.05, 7.0, 2)]
+    delayed = MODEL.with_part("delay", np.array([0.03]))
+    assert own_lags(_sessions(*runs), delayed, STANDARD) == pytest.approx({0: 0.01, 1: 0.05}, abs=1e-3)
+
+
+def test_one_recording_and_one_that_continues_another_tell_no_clocks() -> None:
+    late = _late("late", 0.05, 7.0, 2)
+    assert own_lags(_sessions(late), MODEL, STANDARD) == {}
+    assert own_lags(_sessions(_late("early", 0.0, 6.0, 1), late), MODEL, STANDARD)
+    goes_on = _late("late", 0.05, 7.0, 2, continues="early")
+    assert own_lags(_sessions(_late("early", 0.0, 6.0, 1), goes_on), MODEL, STANDARD) == {}
+
+
+def test_what_the_reader_calls_material_decides_how_far_clocks_may_differ() -> None:
+    runs = _sessions(_late("early", 0.0, 6.0, 1), _late("late", 0.02, 7.0, 2))
+    assert own_lags(runs, MODEL, STANDARD)
+    assert own_lags(runs, MODEL, replace(STANDARD, imperfection=0.01, tolerable=0.02)) == {}
