@@ -62,14 +62,23 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
             does = "lags" if offset_s > 0 else "leads"
             more = f" in the middle, by {abs(rate):.2g} s {'more' if rate * offset_s >= 0 else 'less'} each second"
             by = f"by {abs(offset_s):.3g} s{more if rate else ''}"
-            says.append(
-                f"{recording.label}: the reading {does} those of the fitted recordings {by}; it was shifted to their"
-                " clock before it is used as held-out data"
-                if place in integrity.others
-                else f"{recording.label}: the reading {does} the load {by}, as with two clocks, and was shifted to the"
-                " load's clock before anything else: delays of this recording are not diagnosed; if the unit itself is"
-                " late, the force of a calibration is late by as much"
-            )
+            if place in integrity.others:
+                said = (
+                    f"the reading {does} those of the fitted recordings {by}; it was shifted to their clock before it"
+                    " is used as held-out data"
+                )
+            elif integrity.are_about_mean:
+                said = (
+                    f"the reading {does} those of the other recordings {by}, as with a clock of its own, and was"
+                    " shifted to theirs before anything else"
+                )
+            else:
+                said = (
+                    f"the reading {does} the load {by}, as with two clocks, and was shifted to the load's clock before"
+                    " anything else: delays of this recording are not diagnosed; if the unit itself is late, the force"
+                    " of a calibration is late by as much"
+                )
+            says.append(f"{recording.label}: {said}")
         made.append(recording)
         usable.append(mask if clock_in_model is None else mask & _is_load_known(recording, clock_in_model))
     if clock_in_model is None:

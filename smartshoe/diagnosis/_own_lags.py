@@ -6,10 +6,12 @@ tens of milliseconds, and in each file by others. One delay for all files cannot
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri, stdtrit
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._noise import effective_noise_sd
@@ -19,27 +21,42 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
 
-def own_lags(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Mapping[int, float]:
-    """By how much the reading of each recording is later than the load, in s; empty where one delay serves all.
+@dataclass(frozen=True)
+class OwnLags:
+    """By how much the reading of each recording is later than its load, in s, by the recordings' places.
 
-    The fitted recordings' lags must differ for certain (chi-square of their distances from the mean, at
-    ``false_alarm``), and by what moves the reading more than an ``imperfection``. Then the clocks may also be late in
-    all recordings, so that the lags include the delay of the ``model``. The keys are the recordings' places.
+    ``are_about_mean``: the fitted recordings share a delay, which is left to a model; the lags are about it.
+    """
+
+    each_s: Mapping[int, float]
+    are_about_mean: bool
+
+
+def own_lags(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> OwnLags | None:
+    """The recordings' own lags beside ``model``, or None where one delay serves all.
+
+    Those of the fitted recordings must differ for certain (chi-square of their distances from the mean, at
+    ``false_alarm``), and by what moves the reading by more than ``tolerable``. A delay that all share is the unit's
+    where their mean differs from zero (Student's t, 95 %); else it may be the clocks' as well, and is in the lags.
     """
     usable = [one for one in sessions if one.usable.any()]
     is_fitted = np.array([bool(one.fitted.any()) for one in usable])
     count = int(is_fitted.sum())
     if count < 2 or any("continues" in one.recording.metadata for one in usable):
-        return {}
+        return None
     lags_s, squares, sds = np.transpose([_lag_of(one, model) for one in usable])
     fitted_s, weights = lags_s[is_fitted], sds[is_fitted] ** -2
     off_s = fitted_s - weights @ fitted_s / weights.sum()
     samples = sum(int(one.fitted.sum()) for one in usable)
     moved_rms = np.sqrt(squares[is_fitted] @ off_s**2 / samples)
-    if weights @ off_s**2 <= chi2.isf(thresholds.false_alarm, count - 1) or moved_rms <= thresholds.imperfection:
-        return {}
-    delay_s = sum(part.effect.delay_s(part.values) for part in model.parts)
-    return {one.index: float(lag_s) + delay_s for one, lag_s in zip(usable, lags_s, strict=True)}
+    if weights @ off_s**2 <= chdtri(count - 1, thresholds.false_alarm) or moved_rms <= thresholds.tolerable:
+        return None
+    lags_s += sum(part.effect.delay_s(part.values) for part in model.parts)
+    mean_s = float(np.mean(lags_s[is_fitted]))
+    mean_sd_s = float(np.std(lags_s[is_fitted], ddof=1)) / math.sqrt(count)
+    are_about_mean = abs(mean_s) > float(stdtrit(count - 1, 0.975)) * mean_sd_s
+    lags_s -= are_about_mean * mean_s
+    return OwnLags({one.index: float(lag_s) for one, lag_s in zip(usable, lags_s, strict=True)}, are_about_mean)
 
 
 def _lag_of(session: Session, model: ExtendedModel) -> Array:

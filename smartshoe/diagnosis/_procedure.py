@@ -81,9 +81,9 @@ def diagnosed(
     """The diagnosis of ``recordings``; the first ``count`` are fitted, the others are held out."""
     given = prepared(recordings, count, integrity, thresholds)
     found = infer_with_gas_check(given.start, given.sessions, thresholds, progress, not given.is_no_unit)
-    if lags_s := own_lags(given.sessions, found.fit.model, thresholds):
+    if (lags := own_lags(given.sessions, found.fit.model, thresholds)) is not None:
         progress("going through it again with each recording on one clock")
-        on_one_clock = integrity.with_lags(lags_s, is_in_model=bool(given.clocks))
+        on_one_clock = integrity.with_lags(lags.each_s, lags.are_about_mean, were_in_model=bool(given.clocks))
         again = prepared(recordings, count, on_one_clock, thresholds)
         other = infer_with_gas_check(again.start, again.sessions, thresholds, progress, not again.is_no_unit)
         if error_of(again.sessions, other.fit.model) < error_of(given.sessions, found.fit.model):

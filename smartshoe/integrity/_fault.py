@@ -98,8 +98,8 @@ class Integrity:
     ``clock_offset_s`` is how much later the reading is than the load in the middle of the recording, 0 where the clocks
     agree; ``clock_rate`` is how that lag grows in s per s. ``one_clock`` is the lag that all fitted recordings share,
     where one pair of clocks explains it. ``others`` are the places of recordings that are only judged on and go by
-    other clocks. ``refusals`` says why each recording without a usable sample is useless, in a sentence each, in their
-    order.
+    other clocks. ``are_about_mean``: the offsets are about a lag that the recordings share, which is left to a model.
+    ``refusals`` says why each recording without a usable sample is useless, in a sentence each, in their order.
     """
 
     recordings: tuple[Recording, ...]
@@ -110,12 +110,13 @@ class Integrity:
     one_clock: OneClock | None
     refusals: tuple[str, ...]
     others: frozenset[int] = frozenset()
+    are_about_mean: bool = False
 
-    def with_lags(self, lags_s: Mapping[int, float], *, is_in_model: bool) -> Integrity:
+    def with_lags(self, lags_s: Mapping[int, float], are_about_mean: bool, *, were_in_model: bool) -> Integrity:
         """The same with readings that lag by ``lags_s`` more, by the recordings' places, and no clock that all share.
 
-        ``is_in_model``: the lags found before were left to a model, and are in those given.
+        ``were_in_model``: the lags found before were left to a model, and are in those given.
         """
-        before_s = (0.0,) * len(self.clock_offset_s) if is_in_model else self.clock_offset_s
+        before_s = (0.0,) * len(self.clock_offset_s) if were_in_model else self.clock_offset_s
         offsets_s = tuple(offset_s + lags_s.get(place, 0.0) for place, offset_s in enumerate(before_s))
-        return replace(self, clock_offset_s=offsets_s, one_clock=None)
+        return replace(self, clock_offset_s=offsets_s, one_clock=None, are_about_mean=are_about_mean)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._own_lags import own_lags
+from smartshoe.diagnosis._own_lags import OwnLags, own_lags
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.models.effects import Conditions
@@ -46,37 +46,50 @@ def _sessions(*runs: Recording, held_out: int = 0) -> list[Session]:
 lags = st.floats(-0.05, 0.05)
 
 
+def _own(*runs: Recording, model: ExtendedModel = MODEL, held_out: int = 0) -> OwnLags | None:
+    return own_lags(_sessions(*runs, held_out=held_out), model, STANDARD)
+
+
 @given(st.tuples(lags, lags, lags), st.integers(0, 99))
 def test_lags_that_differ_are_found_to_a_millisecond_and_others_are_none(
     lags_s: tuple[float, float, float], seed: int
 ) -> None:
     """Triangles of 6 s move the reading by 0.5 full scales a second: 3 ms are what small imperfections do."""
-    runs = [_late(f"r{k}", lag_s, 6.0 + k, seed + k) for k, lag_s in enumerate(lags_s)]
-    found = own_lags(_sessions(*runs, held_out=1), MODEL, STANDARD)
+    found = _own(*(_late(f"r{k}", lag_s, 6.0 + k, seed + k) for k, lag_s in enumerate(lags_s)), held_out=1)
     apart_s = abs(lags_s[0] - lags_s[1])  # the last one is only judged, and tells nothing of the others
     if apart_s > 0.012:
-        assert set(found) == {0, 1, 2}
-    elif apart_s < 0.002:
-        assert found == {}
-    if found:
-        assert [found[k] for k in range(3)] == pytest.approx(lags_s, abs=1e-3)
+        assert found is not None
+    elif apart_s < 0.003:
+        assert found is None
+    if found is not None:
+        mean_s = np.mean(lags_s[:2]) if found.are_about_mean else 0.0
+        assert [found.each_s[k] + mean_s for k in range(3)] == pytest.approx(lags_s, abs=1e-3)
 
 
 def test_the_models_delay_is_a_part_of_each_lag_since_the_clocks_may_have_made_it() -> None:
     runs = [_late("early", 0.01, 6.0, 1), _late("late", 0.05, 7.0, 2)]
-    delayed = MODEL.with_part("delay", np.array([0.03]))
-    assert own_lags(_sessions(*runs), delayed, STANDARD) == pytest.approx({0: 0.01, 1: 0.05}, abs=1e-3)
+    found = _own(*runs, model=MODEL.with_part("delay", np.array([0.03])))
+    assert found is not None
+    assert not found.are_about_mean  # two lags of 10 and 50 ms have a mean of 30 +- 20 ms, widened by Student's 12.7
+    assert found.each_s == pytest.approx({0: 0.01, 1: 0.05}, abs=1e-3)
+
+
+def test_a_delay_that_is_large_beside_what_clocks_differ_by_is_the_units() -> None:
+    runs = [_late(f"r{k}", lag_s, 6.0 + k, k) for k, lag_s in enumerate((0.085, 0.1, 0.115))]
+    found = _own(*runs)
+    assert found is not None
+    assert found.are_about_mean
+    assert found.each_s == pytest.approx({0: -0.015, 1: 0.0, 2: 0.015}, abs=1e-3)
 
 
 def test_one_recording_and_one_that_continues_another_tell_no_clocks() -> None:
-    late = _late("late", 0.05, 7.0, 2)
-    assert own_lags(_sessions(late), MODEL, STANDARD) == {}
-    assert own_lags(_sessions(_late("early", 0.0, 6.0, 1), late), MODEL, STANDARD)
-    goes_on = _late("late", 0.05, 7.0, 2, continues="early")
-    assert own_lags(_sessions(_late("early", 0.0, 6.0, 1), goes_on), MODEL, STANDARD) == {}
+    early, late = _late("early", 0.0, 6.0, 1), _late("late", 0.05, 7.0, 2)
+    assert _own(late) is None
+    assert _own(early, late) is not None
+    assert _own(early, _late("late", 0.05, 7.0, 2, continues="early")) is None
 
 
-def test_what_the_reader_calls_material_decides_how_far_clocks_may_differ() -> None:
+def test_what_a_good_units_imperfections_add_up_to_decides_how_far_clocks_may_differ() -> None:
     runs = _sessions(_late("early", 0.0, 6.0, 1), _late("late", 0.02, 7.0, 2))
-    assert own_lags(runs, MODEL, STANDARD)
-    assert own_lags(runs, MODEL, replace(STANDARD, imperfection=0.01, tolerable=0.02)) == {}
+    assert own_lags(runs, MODEL, STANDARD) is not None
+    assert own_lags(runs, MODEL, replace(STANDARD, tolerable=0.02)) is None

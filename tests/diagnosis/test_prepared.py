@@ -30,7 +30,12 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     def integrity(lag_s: float) -> Any:
         lags_s, shared = (lag_s,) * 3, OneClock(lag_s, 0.0)
         return SimpleNamespace(
-            clock_offset_s=lags_s, clock_rate=(0.0,) * 3, one_clock=shared, usable=usable, others=frozenset()
+            clock_offset_s=lags_s,
+            clock_rate=(0.0,) * 3,
+            one_clock=shared,
+            usable=usable,
+            others=frozenset(),
+            are_about_mean=False,
         )
 
     found = prepared(runs, 2, integrity(0.0), STANDARD)
@@ -48,7 +53,12 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     # A reading that is moved by itself matters where it is fitted.
     for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
         apart = SimpleNamespace(
-            clock_offset_s=lags, clock_rate=(0.0,) * 3, one_clock=None, usable=usable, others=frozenset()
+            clock_offset_s=lags,
+            clock_rate=(0.0,) * 3,
+            one_clock=None,
+            usable=usable,
+            others=frozenset(),
+            are_about_mean=False,
         )
         assert prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
     # Friction in each recording is no unit's; in one of them it is said.

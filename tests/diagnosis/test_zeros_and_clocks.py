@@ -379,7 +379,12 @@ def _told(
 ) -> Any:
     usable = tuple(one.sensor.present for one in runs)
     integrity: Any = SimpleNamespace(
-        clock_offset_s=offset_s, clock_rate=rate, one_clock=shared, usable=usable, others=frozenset()
+        clock_offset_s=offset_s,
+        clock_rate=rate,
+        one_clock=shared,
+        usable=usable,
+        others=frozenset(),
+        are_about_mean=False,
     )
     return aligned(runs, integrity)
 
@@ -409,6 +414,18 @@ def test_a_reading_of_another_clock_is_moved_to_the_loads(lag_s: float, way: str
     assert found.usable[1].all()
 
 
+def test_readings_moved_about_a_shared_delay_say_so() -> None:
+    runs = [_late(0.6), _run()]
+    usable = tuple(one.sensor.present for one in runs)
+    integrity: Any = SimpleNamespace(
+        clock_offset_s=(0.6, 0.0), clock_rate=(0.0, 0.0), one_clock=None, usable=usable, others=frozenset(),
+        are_about_mean=True,
+    )  # fmt: skip
+    (said,) = aligned(runs, integrity).says
+    assert "the reading lags those of the other recordings by 0.6 s" in said
+    assert "not diagnosed" not in said
+
+
 def test_a_clock_that_runs_fast_is_slowed() -> None:
     found = _told((0.2, 0.0), (0.01, 0.0), [_late(0.2, 0.01), _run()])
     off = found.recordings[0].sensor.values - FULL_MBAR * PRESSED
@@ -421,7 +438,12 @@ def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
     masks[0][500:520] = False
     lags_s = (0.6, 0.0)
     integrity: Any = SimpleNamespace(
-        clock_offset_s=lags_s, clock_rate=(0.0, 0.0), one_clock=None, usable=tuple(masks), others=frozenset()
+        clock_offset_s=lags_s,
+        clock_rate=(0.0, 0.0),
+        one_clock=None,
+        usable=tuple(masks),
+        others=frozenset(),
+        are_about_mean=False,
     )
     lost = np.flatnonzero(~aligned(runs, integrity).usable[0][:1400])
     assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
