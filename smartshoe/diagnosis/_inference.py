@@ -347,7 +347,8 @@ def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tup
     """Of the most probable effects the one that alone predicts left-out data best, if any passes validation.
 
     Where several effects can replace one another none is sure, but which of them does most alone does not depend on the
-    others. It must remove more than the small imperfections of a good unit (``tolerable``).
+    others. It must remove more than the small imperfections of a good unit (``tolerable``), and be more probable than
+    many of these together or leave no more than they may.
     """
     before, thresholds = error_of(sessions, plain.model), initial.thresholds
     if before <= thresholds.tolerable:
@@ -357,9 +358,9 @@ def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tup
     nothing = initial.evidence.posterior(initial.fitted_members)
     for k in best_additions(initial.evidence, initial.fitted_members, BREADTH):
         best = initial.evidence.posterior((*initial.fitted_members, k))
-        if best.score >= nothing.score:
-            continue
         one = State(initial.evidence, best, fit_of_set(initial, best, likelihood))
+        if best.score >= nothing.score and error_of(sessions, one.fit.model) > thresholds.tolerable:
+            continue
         validated = _validated(one, plain, sessions)
         removed = before**2 - error_of(sessions, validated.fit.model) ** 2
         if not validated.is_reduced and removed > thresholds.tolerable**2:
