@@ -306,7 +306,7 @@ def limit_curves_in_tare(
         f" the tare: the parameters of the {listed(curves)} are those of a curve over {scale.load_n:.4g} N (take the"
         f" tare off the loads for those over {(1.0 + tare.value) * scale.load_n:.4g} N)"
         for tare in zeros
-        if curves and tare.effect.shifts == "load" and abs(tare.value) > thresholds.standing
+        if curves and tare.effect.shifts == "load" and not tare.alternatives and abs(tare.value) > thresholds.standing
     ]
 
 
@@ -315,7 +315,12 @@ def limit_force_as_logged(zeros: Sequence[Zero], scale: Scale) -> list[str]:
     return [
         "a calibration gives the force as the load cell shows it,"
         f" {abs(tare.value) * scale.load_n:.3g} N {'more' if tare.value < 0.0 else 'less'} than what presses on the"
-        " unit (take the tare off the loads to calibrate by the latter)"
+        + (
+            f" unit if that is a tare, and no load that the {listed(tare.alternatives)} keeps from the reading (log the"
+            " machine's command, or press less)"
+            if tare.alternatives
+            else " unit (take the tare off the loads to calibrate by the latter)"
+        )
         for tare in zeros
         if tare.effect.shifts == "load"
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from smartshoe.diagnosis._inference import Inference
@@ -66,7 +66,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
     names = tuple(one for one in chosen.names if one.effect not in clocks)
     # An offset is constant: where the zero jumps within recordings there is none.
     kept = tuple(
-        one
+        _with_gaps(one, names, given.excitation.tells_apart | given.excitation.channels)
         for one in zeros
         if not (
             one.may_have_drifted or one.extrapolated_from or (found.zero_changes and one.effect.shifts == "reading")
@@ -83,6 +83,18 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
         *limit_curves_in_tare(kept, [one.effect for one in chosen.names], given.scale, thresholds),
     )
     return replace(chosen, zero_limits=zero_limits)
+
+
+def _with_gaps(zero: Zero, names: Sequence[Name], present: Collection[str]) -> Zero:
+    """A tare with those ``names`` as alternatives that nothing ``present`` tells from it.
+
+    At the load shown at rest the unit reads nothing: under a gap it may bear that load.
+    """
+    if zero.effect.shifts != "load":
+        return zero
+    words = {one.effect.name: zero.effect.separated_by.get(one.effect.name, frozenset()) for one in names}
+    alike = (name for name, told_by in words.items() if told_by and told_by.isdisjoint(present))
+    return replace(zero, alternatives=tuple(dict.fromkeys((*zero.alternatives, *alike))))
 
 
 def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepared) -> NamedCauses:

@@ -39,7 +39,7 @@ class DeadBand(Effect):
     separated_by = {
         "contact_area": by("low_loads"),
         "dropouts": by("repeats"),
-        "load_cell_tare": by("low_loads"),
+        "load_cell_tare": by("command"),
         "sensor_nonlinearity": by("low_loads"),
         "zero_offset": by("low_loads"),
     }

@@ -20,7 +20,7 @@ class LoadCellTare(Effect):
     parameters = (EffectParameter("tare", "FS_load", "acting load less measured load", 0.0, -0.5, 0.5, 0.01),)
     exposed_by = by("rests")
     separated_by = {
-        "dead_band": by("low_loads"),
+        "dead_band": by("command"),
         "zero_offset": by("idle", "pressure_reference"),
     }
     is_seen_at_rest = True
