@@ -397,6 +397,11 @@ def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
         f"{in_words(effect.name)} alone explains most of what the baseline misses on the fitted data"
         f" ({percent(left)} of full scale without it, {percent(beside)} with it), but is not named"
     )
+    if effect.name in found.refused:
+        return [
+            f"{said}: no other recording or load cycle of this data confirms it (repeat the loads that show it, in a"
+            " recording of its own)"
+        ]
     if left > thresholds.clear * thresholds.tolerable:
         return [f"{said}: too little in this data speaks for it against no effect at all"]
     return [

@@ -567,9 +567,12 @@ def test_a_model_gives_readings_as_they_are_logged() -> None:
 
 @pytest.mark.parametrize(("left", "is_small"), [(0.002, True), (0.0029, True), (0.0031, False), (0.08, False)])
 def test_small_imperfections_are_said_to_follow_no_more_than_they_add_up_to(left: float, is_small: bool) -> None:
-    found: Any = SimpleNamespace(nearest_law=(effect("delay"), left, 0.3 * left))
+    found: Any = SimpleNamespace(nearest_law=(effect("delay"), left, 0.3 * left), refused=())
     (said,) = limit_nearest_law(found, Thresholds())
     assert said.startswith(
         f"delay alone explains most of what the baseline misses on the fitted data ({percent(left)} of"
     )
     assert ("small imperfections" in said, "set `material`" in said) == (is_small, is_small)
+    found.refused = ("delay",)
+    (said,) = limit_nearest_law(found, Thresholds())
+    assert "no other recording or load cycle of this data confirms it" in said
