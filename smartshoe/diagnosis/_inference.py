@@ -348,18 +348,19 @@ def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tup
 
     Where several effects can replace one another none is sure, but which of them does most alone does not depend on the
     others. It must remove more than the small imperfections of a good unit (``tolerable``), and be more probable than
-    many of these together or leave no more than they may.
+    these; where they may add up to all that the plain model leaves, it suffices that what it leaves is tolerable.
     """
     before, thresholds = error_of(sessions, plain.model), initial.thresholds
     if before <= thresholds.tolerable:
         return None
+    least_left = thresholds.tolerable if before <= thresholds.clear * thresholds.tolerable else 0.0
     left_out = LeftOut(sessions, initial.evidence.noise_sd, plain.model, thresholds)
     likelihood, standing = initial.likelihood(), []
     nothing = initial.evidence.posterior(initial.fitted_members)
     for k in best_additions(initial.evidence, initial.fitted_members, BREADTH):
         best = initial.evidence.posterior((*initial.fitted_members, k))
         one = State(initial.evidence, best, fit_of_set(initial, best, likelihood))
-        if best.score >= nothing.score and error_of(sessions, one.fit.model) > thresholds.tolerable:
+        if best.score >= nothing.score and error_of(sessions, one.fit.model) > least_left:
             continue
         validated = _validated(one, plain, sessions)
         removed = before**2 - error_of(sessions, validated.fit.model) ** 2

@@ -52,7 +52,10 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     fitted, held = _Session("fitted", 0, np.array([True, True, False])), _Session("held", 1, np.zeros(3, dtype=bool))
     given = SimpleNamespace(
         sessions=[held, fitted], fine=[FINE], scale=SCALE, limits=["limit"], start="start",
-        excitation=SimpleNamespace(goes_with_the_clock=False, hides=lambda effect: False, shows=lambda _: True),
+        excitation=SimpleNamespace(
+            goes_with_the_clock=False, hides=lambda effect: False, shows=lambda _: True, tells_apart=frozenset(),
+            channels=frozenset(),
+        ),
         is_no_unit=False, clocks=(), is_moved=False, thresholds=STANDARD,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
