@@ -86,7 +86,8 @@ def diagnosed(
         on_one_clock = integrity.with_lags(lags.each_s, lags.are_about_mean, were_in_model=bool(given.clocks))
         again = prepared(recordings, count, on_one_clock, thresholds)
         other = infer_with_gas_check(again.start, again.sessions, thresholds, progress, not again.is_no_unit)
-        if error_of(again.sessions, other.fit.model) < error_of(given.sessions, found.fit.model):
+        left, before = error_of(again.sessions, other.fit.model), error_of(given.sessions, found.fit.model)
+        if thresholds.clear * left**2 <= before**2:
             integrity, given, found = on_one_clock, again, other
     sessions, fine, scale = given.sessions, given.fine, given.scale
     progress("judging on held-out data")
