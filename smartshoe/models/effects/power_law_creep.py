@@ -27,13 +27,13 @@ class PowerLawCreep(CoreEffect):
             "1",
             "alpha: how much slower times weigh less, per decade",
             None,
-            0.02,
+            -0.5,
             0.8,
             0.2,
-            kind_ends="upper",
+            kind_ends="both",
         ),
     )
-    shapes = ({"exponent": 0.15}, {"exponent": 0.45})
+    shapes = ({"exponent": -0.25}, {"exponent": 0.15}, {"exponent": 0.45})
     exposed_by = by("holds", "rates", "rests")
     separated_by = {
         "bouc_wen_hysteresis": by("rates"),
