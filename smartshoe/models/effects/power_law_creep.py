@@ -14,7 +14,12 @@ SPACING = math.log10(LONGEST_S / SHORTEST_S) / (ARMS - 1)  # decades
 
 
 class PowerLawCreep(CoreEffect):
-    """Arms with the spectrum c (tau/1 s)^-alpha per decade: relaxation modulus ~ t^-alpha (Mainardi 2010, ch. 3)."""
+    """Arms with the spectrum c (tau/1 s)^-alpha per decade (Mainardi 2010, ch. 3).
+
+    alpha > 0: the relaxation modulus goes with t^-alpha, and creep slows down. alpha < 0: creep grows from decade to
+    decade, as where a step of load is followed by 1 + c t^-alpha (Andrade; Findley). At the lower bound three
+    quarters of their stiffness is in the two slowest arms, and over minutes a set or a drift does the same.
+    """
 
     name, family, stage = "power_law_creep", "relaxation", "wall"
     says = "the wall creeps over all times alike: in holds the reading rises by the same amount in each decade of time"
@@ -25,7 +30,7 @@ class PowerLawCreep(CoreEffect):
         EffectParameter(
             "exponent",
             "1",
-            "alpha: how much slower times weigh less, per decade",
+            "alpha: how much less slower times weigh, per decade; < 0: more",
             None,
             -0.5,
             0.8,
