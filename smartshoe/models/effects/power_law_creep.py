@@ -22,7 +22,7 @@ class PowerLawCreep(CoreEffect):
     """
 
     name, family, stage = "power_law_creep", "relaxation", "wall"
-    says = "the wall creeps over all times alike: in holds the reading rises by the same amount in each decade of time"
+    says = "the wall creeps over all times: in holds the reading rises about as much, or more, in each decade of time"
     parameters = (
         EffectParameter(
             "creep_per_decade", "1", "relative creep over the decade about 1 s, small creep", 0.0, 0.0, 2.0, 0.01
@@ -48,7 +48,7 @@ class PowerLawCreep(CoreEffect):
         "second_relaxation": by("steps", "long_hold"),
     }
     of_either_sign = (
-        "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time",
+        "the sensor relaxes over all times: a held reading moves by about as much, or more, in each decade of time",
         "relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds",
     )
 
