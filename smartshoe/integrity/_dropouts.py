@@ -108,7 +108,7 @@ def dropped(view: View) -> Mask:
 
     Both edges of a run must make up at least half (`clear`) of what is lost between the expected reading and the run's.
     A run whose end is not seen, or at whose end the load is off, counts where it fell from a load that is not small: a
-    contact that lets go at a low load jumps as well.
+    contact that lets go at a low load jumps as well. Two runs with one good sample between them begin and end as one.
     """
     y, given = view.reading.values, view.thresholds
     above = view.expected - view.rest
@@ -119,7 +119,11 @@ def dropped(view: View) -> Mask:
     has_dropped = np.zeros(y.size, dtype=bool)
     jump, gap = given.clear * view.jump, view.gap
     lost = np.where(is_below_rest, view.rest - y, view.expected - y)
-    for first, stop in zip(*runs_of(is_low | is_below_rest), strict=True):
+    is_down = is_low | is_below_rest
+    is_good_between = np.zeros(y.size, dtype=bool)
+    is_good_between[1:-1] = ~is_down[1:-1] & is_down[:-2] & is_down[2:]
+    is_good_between[1:-1] &= (jump[:-1] > lost[:-2]) & (jump[1:] < -lost[2:])
+    for first, stop in zip(*runs_of(is_down | is_good_between), strict=True):
         ends_open = stop == y.size or bool(gap[stop - 1])
         # A spike just before or after the run is no edge: readings must have stood above it.
         falls = first > 0 and jump[first - 1] < -lost[first]
@@ -130,7 +134,7 @@ def dropped(view: View) -> Mask:
             has_dropped[first:stop] = True
         elif falls and (ends_open or not is_loaded[stop]):
             has_dropped[first:stop] = above[first] > given.same * view.span or is_below_rest[first]
-    return has_dropped
+    return has_dropped & is_down
 
 
 def _stood_above(neighbours: Array, level: float) -> bool:

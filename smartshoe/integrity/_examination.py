@@ -36,7 +36,7 @@ from smartshoe.integrity._view import UNKNOWN_ENDS, Ends, Signal, View
 from smartshoe.integrity._wild import with_missing, without_wild
 from smartshoe.integrity._wrapped import unwrapped
 from smartshoe.integrity.thresholds import Thresholds, decided_by
-from smartshoe.recording import Recording
+from smartshoe.recording import SENSOR_NAME, Recording
 
 OF_RECORDING: tuple[Callable[[Recording, Thresholds], Iterator[Finding]], ...] = (
     missing_samples,
@@ -263,7 +263,12 @@ def _lack_of_channels(recording: Recording) -> str | None:
     readings = [one.name for one in recording.sensors]
     if len(readings) > 1:
         return f"there are {len(readings)} readings ({first_names(readings)}): name one with --sensor"
-    return None if readings else f"there is no reading: name its column with --sensor{among}"
+    if readings:
+        return None
+    # A recording of arrays has no columns to choose from: there the array's name tells.
+    like = next((one.unit.suffix for one in recording.of_role("auxiliary")), "v")
+    of_arrays = f"; an array is named {SENSOR_NAME} and its unit, as in {SENSOR_NAME}_{like}="
+    return f"there is no reading: name its column with --sensor{among}" + (of_arrays if not recording.source else "")
 
 
 def _too_large(recording: Recording) -> str | None:

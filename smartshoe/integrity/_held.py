@@ -17,6 +17,7 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.display import moment
 from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._noise_beside import alternates, is_noise, noise_beside, noise_under_motion
 from smartshoe.integrity._scales import ROUNDING, SECOND_DIFFERENCE, turns
 from smartshoe.integrity._view import View, toggling
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -103,6 +104,7 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     """(runs,) upper bound of the log of the chance that honest readings repeat as in each run.
 
     1. Noise: each repeat needs the noise to stay within one step of the grid, however the steps lie about the signal.
+       Where the motion hides the noise, it is seen in higher differences, and dead bands and friction are left out.
     2. Motion: over the whole run the signal moves on by `_motion_per_sample`, and noise would have to make up for what
        exceeds one step.
     """
@@ -114,10 +116,14 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     # Where no grid is found, its step is at most the smallest difference between readings.
     step = reading.local_step[starts]
     step = np.maximum(np.where(step > 0.0, step, reading.least_gap[starts]), ROUNDING * view.span)
-    noise_sd = np.minimum(_noise_beside(y, starts, stops, given.local // 4), view.noise_at_load[starts])
+    noise_sd = np.where(alternates(y, starts, stops, given), noise_beside(y, starts, stops, given.local // 4), 0.0)
+    is_hidden = noise_sd == 0.0
+    noise_sd[is_hidden] = noise_under_motion(y, starts, stops, is_hidden, given.material * view.span, given)
+    noise_sd[is_hidden & _stands_by_itself(view, starts, stops, noise_sd)] = 0.0
+    noise_sd = np.minimum(noise_sd, view.noise_at_load[starts])
     # The noise test says nothing at a rail, which repeats by itself, nor of a signal without noise that toggles between
     # two levels of the grid, which looks like noise of half a step.
-    is_noisy = (noise_sd > toggling(given) * step) & ~_at_either_end(y, starts) & _alternates(y, starts, stops, given)
+    is_noisy = (noise_sd > toggling(given) * step) & ~_at_either_end(y, starts)
     chance = np.ones(starts.size)
     chance[is_noisy] = erf(
         np.maximum(step[is_noisy], _coincident_step(view, bad)) / (np.sqrt(8.0) * noise_sd[is_noisy])
@@ -125,6 +131,8 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     chance[is_noisy] = np.maximum(
         chance[is_noisy], _share_of_equals(y, starts[is_noisy], stops[is_noisy], given.local // 2)
     )
+    # Some converters repeat by themselves, as the readings that repeat once show.
+    chance[is_hidden] = np.maximum(chance[is_hidden], np.count_nonzero(repeats == 1) / y.size)
     motion = _motion_per_sample(view, starts, stops, step)
     excess = np.maximum(0.5 * (motion * repeats - step), 0.0)
     # On a line that rises to ``excess`` the squares add up to those of so many samples that are all off by as much.
@@ -132,6 +140,26 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     noise_at_ends = np.maximum(reading.noise[starts], reading.noise[stops])
     width = np.hypot(noise_at_ends, UNIFORM_SD * step)
     return repeats * np.log(np.maximum(chance, 1e-300)) - samples_off * (excess / width) ** 2
+
+
+def _stands_by_itself(view: View, starts: Index, stops: Index, noise_sd: Array) -> Mask:
+    """(runs,) whether the unit may have made a run by itself: by a dead band or a contact, or by friction.
+
+    1. A dead band comes back to one value: another run stands there, for at least half as long (`clear`).
+    2. What friction held back does not catch up: by the static curve the load has moved, by the first new reading, more
+       than the noise, ``noise_sd`` (runs,), accounts for, and that reading makes up for less than half of it (`clear`).
+    """
+    y, clear = view.reading.values, view.thresholds.clear
+    repeats = stops - starts
+    values, value_of = np.unique(y[starts], return_inverse=True)
+    longest = np.zeros(values.size, dtype=repeats.dtype)
+    np.maximum.at(longest, value_of, repeats)
+    long_runs = np.bincount(value_of, weights=clear * repeats >= longest[value_of])
+    comes_back = (repeats < longest[value_of]) | (long_runs[value_of] > 1)
+    new = np.minimum(stops + 1, y.size - 1)
+    moved, made = view.expected[new] - view.expected[starts], y[new] - y[starts]
+    is_held_back = np.abs(moved) > np.maximum(view.reading.largest * noise_sd, clear * np.sign(moved) * made)
+    return np.asarray(comes_back | is_held_back)
 
 
 def _at_either_end(y: Array, starts: Index) -> Mask:
@@ -154,24 +182,6 @@ def _coincident_step(view: View, bad: Mask) -> float:
     return sum(int(np.count_nonzero(values[lag:] == values[:-lag])) for lag in lags) / expected if expected else 0.0
 
 
-def _noise_beside(y: Array, starts: Index, stops: Index, width: int) -> Array:
-    """(runs,) standard deviation of the noise in ``width`` readings before or after each run, the lesser of the two.
-
-    A side on which most readings repeat is left out. At either end of the recording it is 0, since one side does not
-    tell whether there was noise on the other.
-    """
-    second = np.diff(y, 2)
-    power = np.concatenate([[0.0], np.cumsum(second**2)])
-    changing = np.concatenate([[0], np.cumsum(second != 0.0)])
-    least = np.full(starts.size, np.inf)
-    for low, high in ((starts - width, starts - 1), (stops, stops + width - 1)):
-        first, last = np.clip(low, 0, second.size), np.clip(high, 0, second.size)
-        side_sd = np.sqrt((power[last] - power[first]) / np.maximum(last - first, 1)) / SECOND_DIFFERENCE
-        side_sd = np.where(changing[last] - changing[first] < width // 4, np.inf, side_sd)
-        least = np.where(last - first < width // 2, 0.0, np.minimum(least, side_sd))
-    return np.where(np.isfinite(least), least, 0.0)
-
-
 def _share_of_equals(y: Array, starts: Index, stops: Index, width: int) -> Array:
     """(runs,) share of the ``width`` readings before and after each run that equal it.
 
@@ -186,30 +196,6 @@ def _share_of_equals(y: Array, starts: Index, stops: Index, width: int) -> Array
         equal += (inside & (y[np.clip(index, 0, y.size - 1)] == y[starts][:, None])).sum(axis=1)
         inside_count += inside.sum(axis=1)
     return equal / np.maximum(inside_count, 1.0)
-
-
-def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -> Mask:
-    """(runs,) whether second differences beside each run change sign as often as those of noise do.
-
-    Those of a smooth curve mostly keep their sign.
-    """
-    width = thresholds.local // 2
-    counts = [np.concatenate([[0], np.cumsum(one)]) for one in turns(np.diff(y, 2))]
-    turned, stayed = np.zeros(starts.size, dtype=np.int64), np.zeros(starts.size, dtype=np.int64)
-    for low, high in ((starts - width, starts - 2), (stops, stops + width - 2)):
-        first, last = (np.clip(one, 0, counts[0].size - 1) for one in (low, high))
-        turned += counts[0][last] - counts[0][first]
-        stayed += counts[1][last] - counts[1][first]
-    return _is_noise(turned, stayed, thresholds) & (turned > thresholds.few)
-
-
-def _is_noise(turned: Index | int, stayed: Index | int, thresholds: Thresholds) -> Mask:
-    """Whether second differences changed sign (``turned``) often enough, against keeping it (``stayed``), to be noise.
-
-    Second differences of white noise change sign 2.7 times as often as they keep it; the root of `clear` is asked
-    for.
-    """
-    return np.asarray(turned > np.sqrt(thresholds.clear) * stayed)
 
 
 def _motion_per_sample(view: View, starts: Index, stops: Index, step: Array) -> Array:
@@ -314,7 +300,7 @@ def _stands_under_moving_load(view: View, bad: Mask, starts: Index, stops: Index
             continue
         bends = np.diff(neighbours, 2)
         turned, stayed = (int(one.sum()) for one in turns(bends))
-        alternates = bool(_is_noise(turned, stayed, given))
+        is_alternating = bool(is_noise(turned, stayed, given))
         least_noise = toggling(given) * view.reading.local_step[first]
-        is_held[i] = alternates and float(np.std(bends)) / SECOND_DIFFERENCE > least_noise
+        is_held[i] = is_alternating and float(np.std(bends)) / SECOND_DIFFERENCE > least_noise
     return is_held

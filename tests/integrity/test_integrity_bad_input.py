@@ -225,3 +225,17 @@ def test_a_walk_beside_a_load_that_moves_does_not_go_on_while_it_stands(seed: in
     walk = np.cumsum(np.random.default_rng(seed).standard_normal(TIME_S.size))
     found = examine([_recording(force_n=LOAD_N, pressure_mbar=walk)])
     assert all("goes on while the load stands" not in said for said in found.refusals)
+
+
+@pytest.mark.parametrize("unit_suffix", ["kg", "kgf"])
+def test_a_load_cell_as_the_sensor_is_asked_for_by_its_arrays_name(unit_suffix: str) -> None:
+    """The advice can be followed as it stands; who has a file chooses its column."""
+    rng = np.random.default_rng(1)
+    kilograms = LOAD_N / 9.81 + 0.01 * rng.standard_normal(LOAD_N.size)
+    given_ = _recording(force_n=LOAD_N, **{f"cell_{unit_suffix}": kilograms})
+    (said,) = examine([given_]).refusals
+    assert said.endswith("; an array is named pressure and its unit, as in pressure_kgf=")
+    named = said.rsplit(" ", 1)[1].removesuffix("=")
+    assert examine([_recording(force_n=LOAD_N, **{named: kilograms})]).refusals == ()
+    of_file = examine([replace(given_, source="log.csv")])
+    assert of_file.refusals[0].endswith("name its column with --sensor (columns: cell)")

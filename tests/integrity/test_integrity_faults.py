@@ -132,6 +132,21 @@ def test_a_channel_that_freezes_is_held_until_the_end_or_since_the_beginning(see
     assert np.mean(~found.usable[0][~masked]) < FALSELY_MASKED
 
 
+@pytest.mark.parametrize("lengths", [(16, 25), (40, 6), (30, 12, 20)])
+@pytest.mark.parametrize("seed", range(3))
+def test_dropouts_with_one_good_sample_between_them_are_all_left_out(seed, lengths):
+    recording = recorded(dynamic_protocol(), seed)
+    reading, gone = recording.sensor.values.copy(), np.zeros(len(recording), dtype=bool)
+    start = int(np.flatnonzero(recording.load.values > 500.0)[0])
+    for length in lengths:
+        gone[start : start + length] = True
+        start += length + 1
+    reading[gone] = 0.5 + 1e-4 * np.arange(gone.sum())  # no value that comes again
+    found = examine([with_reading(recording, reading)])
+    assert kinds(found) == {"dropouts"}
+    assert np.array_equal(~found.usable[0], gone)
+
+
 @settings(max_examples=12)
 @given(
     PROTOCOLS,

@@ -248,3 +248,22 @@ def test_what_is_quieter_while_the_load_rests_is_no_tone(seed: int, tone_hz: flo
 )
 def test_where_a_tone_comes_out_at_100_hz(tone_hz: float, logged_hz: float) -> None:
     assert hum.alias_hz(tone_hz, 0.01) == pytest.approx(logged_hz)
+
+
+def test_noise_that_grows_with_the_root_of_the_reading_is_no_jitter() -> None:
+    told = {"timing_jitter": 0, "heteroscedastic_noise": 0}
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        residual = 0.1 * _white(rng) + 0.02 * np.sqrt(CASE.prediction) * rng.standard_normal(CASE.n)
+        for name in told:
+            told[name] += CASE.found(TESTS[name], residual) is not None
+    assert told == {"timing_jitter": 0, "heteroscedastic_noise": 20}
+
+
+def test_the_size_of_jitter_is_told_without_an_exponent() -> None:
+    prediction = 0.5 - 0.5 * np.cos(2 * np.pi * CASE.time_s / 12.5)
+    rng = np.random.default_rng(2)
+    residual = _white(rng) + 0.123 * np.gradient(prediction, STEP_S) * rng.standard_normal(CASE.n)
+    evidence = TESTS["timing_jitter"].evidence(residual, CASE.conditions, prediction)
+    assert evidence is not None
+    assert evidence.says == "the noise grows with the slope of the reading, as from 120 ms of jitter in the sampling"

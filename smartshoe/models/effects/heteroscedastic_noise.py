@@ -1,4 +1,4 @@
-"""Noise that grows with the pressure."""
+"""Noise that grows with the reading."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
     """Noise whose variance has a part in proportion to the pressure's square (a noisy supply, a noisy gain)."""
 
     name, family, stage, place = "heteroscedastic_noise", "noise", "sensor", "sensor"
-    says = "the noise grows with the pressure, at rest of the load as on ramps"
+    says = "the noise grows with the reading, at rest of the load as on ramps"
     exposed_by = by("holds")
     separated_by = {
         "timing_jitter": by("holds"),
@@ -32,5 +32,5 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
         if found is None:
             return None
         value, strength, _ = found
-        says = f"the noise grows with pressure: {percent(strength)} of full scale are added at the largest pressure"
+        says = f"the noise grows with the reading: {percent(strength)} of full scale are added where it is largest"
         return SensorEvidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)
