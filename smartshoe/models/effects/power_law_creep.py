@@ -14,15 +14,10 @@ SPACING = math.log10(LONGEST_S / SHORTEST_S) / (ARMS - 1)  # decades
 
 
 class PowerLawCreep(CoreEffect):
-    """Arms with the spectrum c (tau/1 s)^-alpha per decade (Mainardi 2010, ch. 3).
-
-    alpha > 0: the relaxation modulus goes with t^-alpha, and creep slows down. alpha < 0: creep grows from decade to
-    decade, as where a step of load is followed by 1 + c t^-alpha (Andrade; Findley). At the lower bound three
-    quarters of their stiffness is in the two slowest arms, and over minutes a set or a drift does the same.
-    """
+    """Arms with the spectrum c (tau/1 s)^-alpha per decade: relaxation modulus ~ t^-alpha (Mainardi 2010, ch. 3)."""
 
     name, family, stage = "power_law_creep", "relaxation", "wall"
-    says = "the wall creeps over all times: in holds the reading rises about as much, or more, in each decade of time"
+    says = "the wall creeps over all times alike: in holds the reading rises by the same amount in each decade of time"
     parameters = (
         EffectParameter(
             "creep_per_decade", "1", "relative creep over the decade about 1 s, small creep", 0.0, 0.0, 2.0, 0.01
@@ -30,15 +25,15 @@ class PowerLawCreep(CoreEffect):
         EffectParameter(
             "exponent",
             "1",
-            "alpha: how much less slower times weigh, per decade; < 0: more",
+            "alpha: how much slower times weigh less, per decade",
             None,
-            -0.5,
+            0.02,
             0.8,
             0.2,
-            kind_ends="both",
+            kind_ends="upper",
         ),
     )
-    shapes = ({"exponent": -0.25}, {"exponent": 0.15}, {"exponent": 0.45})
+    shapes = ({"exponent": 0.15}, {"exponent": 0.45})
     exposed_by = by("holds", "rates", "rests")
     separated_by = {
         "bouc_wen_hysteresis": by("rates"),
@@ -48,7 +43,7 @@ class PowerLawCreep(CoreEffect):
         "second_relaxation": by("steps", "long_hold"),
     }
     of_either_sign = (
-        "the sensor relaxes over all times: a held reading moves by about as much, or more, in each decade of time",
+        "the sensor relaxes over all times alike: a held reading moves by the same amount in each decade of time",
         "relative creep over the decade about 1 s, small creep; < 0: the reading falls in holds",
     )
 
