@@ -14,8 +14,6 @@ from smartshoe.models.extended import ExtendedModel
 
 # A repeated sample lags like jitter; a dropout or a spike makes the variance follow the load.
 IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"})
-# The rounding of a coarse grid is an error on ramps and none on holds, and is as uneven as the grid's steps.
-IMITATIONS = {"quantisation": frozenset({"timing_jitter", "heteroscedastic_noise"})}
 
 
 def noise_without_memory(
@@ -77,9 +75,8 @@ def _shown(
     prediction = model.simulate(session.conditions)
     residual = session.reading - prediction
     residual = residual - told_tones(session, residual, lines_of(session, known))
-    explained = faults.union(*(IMITATIONS.get(one, frozenset()) for one in faults))
     for noise in kinds:
-        if noise.name not in explained:
+        if faults.isdisjoint({noise.name, *noise.imitated_by}):
             one = noise.evidence(residual, session.conditions, prediction)
             if one is not None and one.strength >= material:
                 yield _throughout(session, noise.name, one.says, one.lines_hz)

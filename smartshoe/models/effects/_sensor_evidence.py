@@ -44,10 +44,12 @@ class NoiseEffect(Effect):
     """Noise that a test finds in the residual of a model; never named as a cause by its waveform.
 
     ``has_memory``: True for noise that is correlated in time, as structure is that no effect has explained.
+    ``imitated_by``: kinds of data faults beside which it is not sought, since they look like it.
     """
 
     is_physical: ClassVar[bool] = False
     has_memory: ClassVar[bool] = False
+    imitated_by: ClassVar[frozenset[str]] = frozenset()
 
     @abstractmethod
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:

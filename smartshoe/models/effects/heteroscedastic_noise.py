@@ -25,6 +25,7 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
     separated_by = {
         "timing_jitter": by("holds"),
     }
+    imitated_by = frozenset({"quantisation"})  # an error on ramps and none on holds, as uneven as the grid's steps
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
         """Whether the variance of ``residual`` grows with ``prediction``; growth with its slope is fitted apart."""

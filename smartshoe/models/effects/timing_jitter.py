@@ -32,6 +32,7 @@ class TimingJitter(Waveformless, NoiseEffect):
     separated_by = {
         "heteroscedastic_noise": by("holds"),
     }
+    imitated_by = frozenset({"quantisation"})  # an error on ramps and none on holds, as uneven as the grid's steps
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
         """Whether the variance of ``residual`` grows with the slope of ``prediction``; growth with size fitted apart.
