@@ -27,8 +27,7 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     runs = [run(seed) for seed in range(3)]
     usable = tuple(np.ones(600, dtype=bool) for _ in runs)
 
-    def integrity(lag_s: float) -> Any:
-        lags_s, shared = (lag_s,) * 3, OneClock(lag_s, 0.0)
+    def integrity(*lags_s: float, shared: OneClock | None = None) -> Any:
         return SimpleNamespace(
             clock_offset_s=lags_s,
             clock_rate=(0.0,) * 3,
@@ -38,36 +37,31 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
             are_about_mean=False,
         )
 
-    found = prepared(runs, 2, integrity(0.0), STANDARD)
+    def with_lag(lag_s: float) -> Any:
+        return integrity(*(lag_s,) * 3, shared=OneClock(lag_s, 0.0))
+
+    found = prepared(runs, 2, with_lag(0.0), STANDARD)
     assert [bool(one.held_out.all()) for one in found.sessions] == [False, False, True]
     assert [one.thinned for one in found.fine] == [1, 1, 1]
     assert not found.is_no_unit
     assert found.start.parts == ()
-    within = prepared(runs, 3, integrity(0.0), STANDARD)
+    within = prepared(runs, 3, with_lag(0.0), STANDARD)
     assert all(0.1 < float(one.held_out.mean()) < 0.6 for one in within.sessions)
-    late = prepared(runs, 3, integrity(0.3), STANDARD)
+    late = prepared(runs, 3, with_lag(0.3), STANDARD)
     ((name, value),) = [(one.name, one.values) for one in late.start.parts]
     assert (name, value) == ("delay", pytest.approx([0.3]))
     assert (late.start.relaxing_share, late.start.relaxation_rate_per_s) == (0.08, 0.22)
     assert not late.is_moved
     # A reading that is moved by itself matters where it is fitted.
     for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
-        apart = SimpleNamespace(
-            clock_offset_s=lags,
-            clock_rate=(0.0,) * 3,
-            one_clock=None,
-            usable=usable,
-            others=frozenset(),
-            are_about_mean=False,
-        )
-        assert prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
+        assert prepared(runs, count, integrity(*lags), STANDARD).is_moved is is_moved
     # Friction in each recording is no unit's; in one of them it is said.
     lasting_memory = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
-    assert prepared(lasting_memory, 3, integrity(0.0), STANDARD).is_no_unit
-    mixed = prepared([runs[0], lasting_memory[1], runs[2]], 3, integrity(0.0), STANDARD)
+    assert prepared(lasting_memory, 3, with_lag(0.0), STANDARD).is_no_unit
+    mixed = prepared([runs[0], lasting_memory[1], runs[2]], 3, with_lag(0.0), STANDARD)
     assert not mixed.is_no_unit
     assert sum("friction; Coulomb" in said for said in mixed.limits) == 1
-    assert sum("friction; Coulomb" in said for said in prepared(runs, 3, integrity(0.0), STANDARD).limits) == 0
+    assert sum("friction; Coulomb" in said for said in prepared(runs, 3, with_lag(0.0), STANDARD).limits) == 0
 
 
 def replace_reading(one: Recording, reading: Array) -> Recording:
