@@ -62,14 +62,14 @@ def own_lags(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thre
 def _lag_of(session: Session, model: ExtendedModel) -> Array:
     """(3,) by how much the reading is later than the model's in s, the sum of squared slopes, and the lag's deviation.
 
-    By least squares beside the recording's own nuisances, with noise counted once per correlation time; by two steps of
+    By least squares beside the recording's own nuisances, with noise counted once per correlation time; by four steps of
     Gauss and Newton, since the slopes of a late reading are late too.
     """
     mask = session.fitted if session.fitted.any() else session.usable
     time_s, simulated = session.conditions.time_s, model.simulate(session.conditions)
     own = np.linalg.qr(nuisances(session, model.pole_per_s, simulated)[mask])[0]
     lag_s, rest = 0.0, np.zeros(session.reading.size)
-    for _ in range(2):
+    for _ in range(4):
         late = np.interp(time_s - lag_s, time_s, simulated)
         falls, left = -np.gradient(late, time_s)[mask], (session.reading - late)[mask]
         falls, left = (one - own @ (own.T @ one) for one in (falls, left))
