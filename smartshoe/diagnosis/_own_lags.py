@@ -62,7 +62,7 @@ def own_lags(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thre
 def _lag_of(session: Session, model: ExtendedModel) -> Array:
     """(3,) by how much the reading is later than the model's in s, the sum of squared slopes, and the lag's deviation.
 
-    By least squares beside the recording's own nuisances, with noise counted once per correlation time; by four steps of
+    By least squares beside the recording's own nuisances, with noise counted once per correlation time. Four steps of
     Gauss and Newton, since the slopes of a late reading are late too.
     """
     mask = session.fitted if session.fitted.any() else session.usable
