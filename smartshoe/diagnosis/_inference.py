@@ -353,14 +353,17 @@ def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tup
     before, thresholds = error_of(sessions, plain.model), initial.thresholds
     if before <= thresholds.tolerable:
         return None
-    least_left = thresholds.tolerable if before <= thresholds.clear * thresholds.tolerable else 0.0
+    may_add_up = before <= thresholds.clear * thresholds.tolerable
     left_out = LeftOut(sessions, initial.evidence.noise_sd, plain.model, thresholds)
     likelihood, standing = initial.likelihood(), []
     nothing = initial.evidence.posterior(initial.fitted_members)
     for k in best_additions(initial.evidence, initial.fitted_members, BREADTH):
         best = initial.evidence.posterior((*initial.fitted_members, k))
+        is_likelier = best.score < nothing.score
+        if not (is_likelier or may_add_up):
+            continue  # before the fit, which most sets are not worth
         one = State(initial.evidence, best, fit_of_set(initial, best, likelihood))
-        if best.score >= nothing.score and error_of(sessions, one.fit.model) > least_left:
+        if not is_likelier and error_of(sessions, one.fit.model) > thresholds.tolerable:
             continue
         validated = _validated(one, plain, sessions)
         removed = before**2 - error_of(sessions, validated.fit.model) ** 2

@@ -26,6 +26,7 @@ from smartshoe.diagnosis._naming import Name, capped_at_half, names_of
 from smartshoe.diagnosis._prepared import Prepared
 from smartshoe.diagnosis._remembered import may_be_remembered
 from smartshoe.diagnosis._zero import Zero, creeping_tare
+from smartshoe.models.effects import told_apart_by
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ def _with_gaps(zero: Zero, names: Sequence[Name], present: Collection[str]) -> Z
     """
     if zero.effect.shifts != "load":
         return zero
-    words = {one.effect.name: zero.effect.separated_by.get(one.effect.name, frozenset()) for one in names}
+    words = {one.effect.name: told_apart_by(zero.effect, one.effect) for one in names}
     alike = (name for name, told_by in words.items() if told_by and told_by.isdisjoint(present))
     return replace(zero, alternatives=tuple(dict.fromkeys((*zero.alternatives, *alike))))
 

@@ -65,9 +65,8 @@ def noise_under_motion(
     ``least``: smaller irregularities may be those of the load. Differences that touch any run are left out, since what
     friction lets go starts with a corner; their median is taken, which a few other corners do not raise.
     """
-    in_run = np.zeros(y.size, dtype=bool)
-    for first, last in zip(starts, stops, strict=True):
-        in_run[first : last + 1] = True
+    begins, ends = (np.bincount(at, minlength=y.size + 1) for at in (starts, stops + 1))
+    in_run = np.cumsum(begins - ends)[:-1] > 0
     first, last = starts[asked], stops[asked]
     noise_sd = np.zeros(first.size)
     for order in HIGHER:
