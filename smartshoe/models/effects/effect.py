@@ -42,7 +42,8 @@ class EffectParameter:
     suffice. ``absent``: its value in files of models that are older than the parameter; None where every file holds it.
     ``kind_ends``: the bounds at which the effect turns into one of another kind, as a relaxation with a time constant
     beyond all holds into a drift; '' where a bound is only the farthest that was seen. ``natural``: the bounds of what
-    can be at all, as none and all of a share: at these the equation still holds.
+    can be at all, as none and all of a share: at these the equation still holds. ``farthest``: a lower bound beyond
+    ``lower``, for models whose fit ended there; a search with such a width bends the law towards what is none.
     """
 
     name: str
@@ -57,6 +58,7 @@ class EffectParameter:
     kind_ends: Literal["", "lower", "upper", "both"] = ""
     absent: float | None = None
     natural: Literal["", "lower", "upper", "both"] = ""
+    farthest: float | None = None
 
     def is_stretched(self, value: float) -> bool:
         """Whether a value lies at a bound that is not a natural one."""
@@ -280,6 +282,20 @@ class Effect(ABC):
     def of_any_sensor(self) -> Effect:
         """The effect for a reading that is no pressure: stress, or the conduction of a polymer, may fall in holds."""
         return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
+
+    def widened_at(self, values: Array) -> Effect | None:
+        """The effect with each bound that ``values`` lie at moved to the ``farthest``; None where there is none.
+
+        Its one shape lies half way there.
+        """
+        at = [p.name for p, value in zip(self.parameters, values, strict=True) if p.farthest and value <= p.lower]
+        if not at:
+            return None
+        wider = [replace(p, lower=p.farthest, farthest=None) if p.name in at else p for p in self.parameters]
+        shape = {p.name: 0.5 * p.lower if p.name in at else float(v) for p, v in zip(wider, values, strict=True)}
+        variant = copy(self)
+        vars(variant).update(parameters=tuple(wider), shapes=(shape,))
+        return variant
 
     def of_at_most(self, value: float) -> Effect:
         """The effect, of one parameter, with bounds at null and at ``value``."""
