@@ -86,8 +86,7 @@ def beyond_bounds(state: State, progress: Progress) -> State:
             continue
         progress(f"trying {part.name} beyond its usual bounds")
         likelihood, rest = state.likelihood(), state.fit.model.without(part.name)
-        begun = [rest.with_part(law, values) for values in (part.values, law.begun())]
-        freed = min((fit(likelihood, one) for one in begun), key=lambda one: one.cost)
+        freed = fit(likelihood, rest.with_part(law, part.values))
         fits = [freed, *(fit(likelihood, freed.model.without(name)) for name in rest.names)]
         odds = state.evidence.odds
         best = min(fits, key=lambda one: with_odds(one.cost, one.model, odds))
