@@ -36,7 +36,7 @@ from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
 from smartshoe.diagnosis._session import Session, fitted_of
-from smartshoe.diagnosis._settling import Progress, law_or_block, settled, simpler, simpler_from
+from smartshoe.diagnosis._settling import Progress, beyond_bounds, law_or_block, settled, simpler, simpler_from
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, state_at
 from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
 from smartshoe.integrity.thresholds import Thresholds
@@ -139,6 +139,10 @@ def infer(
         if not other.is_reduced and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
     found, members = _best_by_single_changes(found, plain, sessions, progress)
+    if any(part.widened for part in found.fit.model.parts):
+        wider = _validated(beyond_bounds(state_at(found.fit, state.banned), progress), plain, sessions)
+        if not wider.is_reduced and error_of(sessions, wider.fit.model) < error_of(sessions, found.fit.model):
+            found, members = _best_by_single_changes(wider, plain, sessions, progress)
     if found.is_reduced:
         found = found.reduced_to(plain)
         members = found.members()

@@ -76,6 +76,25 @@ def simpler(other: State, state: State) -> State:
     return other if _is_simpler(other.fit, state) else state
 
 
+def beyond_bounds(state: State, progress: Progress) -> State:
+    """The state with each law that ended at a bound freed of it (`Effect.widened_at`), if that is simpler.
+
+    It is also fitted without each other effect, which may be there only for what the law missed at its bound.
+    """
+    for part in state.fit.model.parts:
+        if (law := part.widened) is None:
+            continue
+        progress(f"trying {part.name} beyond its usual bounds")
+        likelihood, rest = state.likelihood(), state.fit.model.without(part.name)
+        freed = fit(likelihood, rest.with_part(law, part.values))
+        fits = [freed, *(fit(likelihood, freed.model.without(name)) for name in rest.names)]
+        odds = state.evidence.odds
+        best = min(fits, key=lambda one: with_odds(one.cost, one.model, odds))
+        if _is_simpler(best, state):
+            state = settled(state_at(best, state.banned), progress)
+    return state
+
+
 def law_or_block(lawful: State, state: State) -> State:
     """The state with a law in the place of a flexible block, or ``state`` with the block if that has more evidence.
 

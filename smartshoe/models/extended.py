@@ -57,6 +57,11 @@ class Part:
         return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
 
     @property
+    def widened(self) -> Effect | None:
+        """The effect free of the bounds that the values lie at; None where it is free already."""
+        return self.effect.widened_at(self.values)
+
+    @property
     def bends_too_little(self) -> bool:
         """Whether it is a law of a curve, with a strength at the end of its range: the unit may bend farther than that.
 

@@ -42,7 +42,9 @@ class EffectParameter:
     suffice. ``absent``: its value in files of models that are older than the parameter; None where every file holds it.
     ``kind_ends``: the bounds at which the effect turns into one of another kind, as a relaxation with a time constant
     beyond all holds into a drift; '' where a bound is only the farthest that was seen. ``natural``: the bounds of what
-    can be at all, as none and all of a share: at these the equation still holds.
+    can be at all, as none and all of a share: at these the equation still holds. ``farthest``: a bound beyond
+    ``lower`` or ``upper`` for models whose fit ended there; a search with such a width bends the law towards what is
+    none.
     """
 
     name: str
@@ -57,11 +59,20 @@ class EffectParameter:
     kind_ends: Literal["", "lower", "upper", "both"] = ""
     absent: float | None = None
     natural: Literal["", "lower", "upper", "both"] = ""
+    farthest: float | None = None
 
     def is_stretched(self, value: float) -> bool:
         """Whether a value lies at a bound that is not a natural one."""
         below, above = self.natural not in ("lower", "both"), self.natural not in ("upper", "both")
         return (below and value <= self.lower) or (above and value >= self.upper)
+
+    @property
+    def widened(self) -> EffectParameter:
+        """The parameter with ``farthest`` for the bound on its side."""
+        if self.farthest is None:
+            return self
+        lower, upper = min(self.farthest, self.lower), max(self.farthest, self.upper)
+        return replace(self, lower=lower, upper=upper, farthest=None)
 
     def is_where_kind_ends(self, value: float) -> bool:
         """Whether a value lies at a bound beyond which the effect is of another kind."""
@@ -280,6 +291,18 @@ class Effect(ABC):
     def of_any_sensor(self) -> Effect:
         """The effect for a reading that is no pressure: stress, or the conduction of a polymer, may fall in holds."""
         return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
+
+    def widened_at(self, values: Array) -> Effect | None:
+        """The effect with each bound that ``values`` lie at moved to the ``farthest``; None where there is none."""
+        wider = tuple(
+            p.widened if not p.widened.is_stretched(v) and p.is_stretched(v) else p
+            for p, v in zip(self.parameters, map(float, values), strict=True)
+        )
+        if wider == self.parameters:
+            return None
+        variant = copy(self)
+        vars(variant).update(parameters=wider)
+        return variant
 
     def of_at_most(self, value: float) -> Effect:
         """The effect, of one parameter, with bounds at null and at ``value``."""

@@ -31,6 +31,7 @@ class PowerLawCreep(CoreEffect):
             0.8,
             0.2,
             kind_ends="upper",
+            farthest=-0.5,
         ),
     )
     shapes = ({"exponent": 0.15}, {"exponent": 0.45})
