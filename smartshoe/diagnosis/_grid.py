@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._averaging import LEAST_WINDOW
+from smartshoe.diagnosis._averaging import LEAST_WINDOW, smoothed, thinning_weights
 from smartshoe.diagnosis._neighbours import neighbours_of
 from smartshoe.diagnosis._scale import Scale, reading_in
 from smartshoe.diagnosis._slow_stretches import spacing_of
@@ -38,9 +38,12 @@ def longest_step_s(recording: Recording, factor: int) -> float:
 
 
 def logged_on_grid(
-    recording: Recording, usable: Mask, scale: Scale, longest_s: float, thresholds: Thresholds
+    recording: Recording, usable: Mask, scale: Scale, longest_s: float, thresholds: Thresholds, *, is_judged: bool
 ) -> Logged:
-    """The recording on an even grid; samples are usable up to ``longest_s`` apart."""
+    """The recording on an even grid; samples are usable up to ``longest_s`` apart.
+
+    ``is_judged``: the reading keeps its noise, of which lines between samples would average a part away.
+    """
     time_s, step_s = recording.time_s - recording.time_s[0], recording.sample_time_s
     known = recording.load.present
     good = usable & recording.sensor.present & known
@@ -54,10 +57,15 @@ def logged_on_grid(
     is_near = np.abs(time_s[nearest] - even) < step_s
     spacing = spacing_of(time_s, even, longest_s, thresholds)
     good, known = (one[nearest] & is_near | spacing.followed(one) for one in (good, known))
+    on_grid = np.interp(even, time_s, reading)
+    if is_judged:
+        course = smoothed(reading, thinning_weights(1, reading.size), 1)  # shows how far to go from the sample to the grid's moment
+        moved = reading[nearest] + np.interp(even, time_s, course) - course[nearest]
+        on_grid = np.where(is_near, moved, on_grid)
     return Logged(
         even,
         np.interp(even, time_s, load_n),
-        np.interp(even, time_s, reading),
+        on_grid,
         good,
         known,
         {name: np.interp(even, time_s, values) for name, values in auxiliary.items()},

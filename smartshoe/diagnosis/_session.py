@@ -189,6 +189,7 @@ def _session(
         scale,
         longest_step_s(recording, factor if template is None else template.thinned),
         thresholds,
+        is_judged=template is not None,
     )
     reading = scale.share(logged.reading)
     weights = thinning_weights(factor, reading.size) if template is None else kernel(1)
