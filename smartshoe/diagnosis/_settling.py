@@ -81,13 +81,13 @@ def beyond_bounds(state: State, progress: Progress) -> State:
 
     It is also fitted without each other effect, which may be there only for what the law missed at its bound.
     """
-    for part in state.fit.model.parts:
-        if (law := part.widened) is None:
-            continue
-        progress(f"trying {part.name} beyond its usual bounds")
-        likelihood, rest = state.likelihood(), state.fit.model.without(part.name)
-        freed = fit(likelihood, rest.with_part(law, part.values))
-        fits = [freed, *(fit(likelihood, freed.model.without(name)) for name in rest.names)]
+    for name in state.fit.model.names:
+        if name not in state.fit.model.names or (freed := state.fit.model.freed(name)) is None:
+            continue  # it went with another one, or has no farther bound where it is
+        progress(f"trying {listed([name])} beyond its usual bounds")
+        likelihood = state.likelihood()
+        found = fit(likelihood, freed)
+        fits = [found, *(fit(likelihood, found.model.without(other)) for other in freed.names if other != name)]
         odds = state.evidence.odds
         best = min(fits, key=lambda one: with_odds(one.cost, one.model, odds))
         if _is_simpler(best, state):

@@ -57,11 +57,6 @@ class Part:
         return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
 
     @property
-    def widened(self) -> Effect | None:
-        """The effect free of the bounds that the values lie at; None where it is free already."""
-        return self.effect.widened_at(self.values)
-
-    @property
     def bends_too_little(self) -> bool:
         """Whether it is a law of a curve, with a strength at the end of its range: the unit may bend farther than that.
 
@@ -130,6 +125,16 @@ class ExtendedModel:
     def part(self, name: str) -> Part:
         """The part of the effect ``name``; raises `KeyError` where the model has none."""
         return {part.name: part for part in self.parts}[name]
+
+    def freed(self, name: str) -> ExtendedModel | None:
+        """This model with the effect ``name`` free of the bounds that it ended at (`Effect.widened_at`), if there are.
+
+        None where it has no farther bound there.
+        """
+        at = self.part(name)
+        wider = at.effect.widened_at(at.values)
+        parts = (replace(part, effect=wider) if wider is not None and part is at else part for part in self.parts)
+        return None if wider is None else replace(self, parts=tuple(parts))
 
     def without(self, *names: str) -> ExtendedModel:
         """This model without the named effects; itself where it has none of them."""
