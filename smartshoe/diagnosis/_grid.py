@@ -55,7 +55,7 @@ def logged_on_grid(
     even = np.asarray(step_s * np.arange(int(time_s[-1] / step_s) + 1), dtype=np.float64)
     nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
     is_near = np.abs(time_s[nearest] - even) < step_s
-    spacing = spacing_of(time_s, even, longest_s, thresholds)
+    spacing = spacing_of(time_s, load_n, even, longest_s, thresholds)
     good, known = (one[nearest] & is_near | spacing.followed(one) for one in (good, known))
     on_grid = np.interp(even, time_s, reading)
     if is_judged:

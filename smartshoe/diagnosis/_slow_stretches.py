@@ -10,14 +10,14 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.display import moment, percent
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
-from smartshoe.signals.masks import runs_of
+from smartshoe.signals.masks import bridged, runs_of
 
 
 @dataclass(frozen=True, eq=False)
 class Spacing:
     """For moments (m,): the next sample ``after`` each, and the distance of the two samples around it.
 
-    ``is_close``: close enough for fits to follow. ``is_even``: as far apart as those nearby, so that there is no gap.
+    ``is_close``: close enough for fits to follow, or under a load that stands still between them. ``is_even``: as far apart as those nearby, so that there is no gap.
     """
 
     after: Index
@@ -37,8 +37,12 @@ class Spacing:
         return self.is_even & good[self.after] & good[self.after - 1]
 
 
-def spacing_of(time_s: Array, at_s: Array, longest_s: float, thresholds: Thresholds) -> Spacing:
-    """The spacing of samples at ``time_s`` (n,) around moments ``at_s`` (m,); close is up to ``longest_s`` apart."""
+def spacing_of(time_s: Array, load: Array, at_s: Array, longest_s: float, thresholds: Thresholds) -> Spacing:
+    """The spacing of samples of a ``load`` at ``time_s`` (n,) around moments ``at_s`` (m,).
+
+    Close is up to ``longest_s`` apart, and any distance in a hold, which is often logged more slowly the longer it
+    lasts.
+    """
     from scipy.ndimage import maximum_filter1d, median_filter
 
     step_s = np.diff(time_s)
@@ -46,7 +50,10 @@ def spacing_of(time_s: Array, at_s: Array, longest_s: float, thresholds: Thresho
     usual_s = maximum_filter1d(median_filter(step_s, thresholds.local, mode="nearest"), thresholds.local + 1)
     is_even = step_s <= (1.0 + thresholds.same) * usual_s
     after = np.clip(np.searchsorted(time_s, at_s), 1, time_s.size - 1)
-    return Spacing(after, is_even[after - 1] & (at_s <= time_s[-1]), step_s[after - 1] <= longest_s)
+    stands = np.abs(np.diff(load)) <= thresholds.standing * float(np.ptp(load))
+    is_even[1:] |= stands[1:] & (step_s[1:] <= thresholds.clear * step_s[:-1])  # a gap comes at once
+    is_close = (step_s <= longest_s) | stands
+    return Spacing(after, is_even[after - 1] & (at_s <= time_s[-1]), is_close[after - 1])
 
 
 def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> list[str]:
@@ -56,7 +63,8 @@ def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, t
     time_s, step_s = recording.time_s, recording.sample_time_s
     at_s = np.arange(time_s[0], time_s[-1], step_s)
     good = usable & recording.sensor.present & recording.load.present
-    spacing = spacing_of(time_s, at_s, longest_s, thresholds)
+    load = bridged(time_s, recording.force_n, recording.load.present)
+    spacing = spacing_of(time_s, load, at_s, longest_s, thresholds)
     slow = spacing.too_slow(good)
     if not slow.any():
         return []

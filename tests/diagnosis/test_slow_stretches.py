@@ -22,7 +22,8 @@ def _stamps(*stretches: tuple[int, float]) -> Array:
 
 
 def _seen(time_s: Array, at_s: Array, good: NDArray[np.bool_], longest_s: float) -> list[NDArray[np.bool_]]:
-    spacing = spacing_of(time_s, at_s, longest_s, STANDARD)
+    moving = np.arange(time_s.size) % 2.0
+    spacing = spacing_of(time_s, moving, at_s, longest_s, STANDARD)
     return [spacing.followed(good), spacing.too_slow(good)]
 
 
@@ -86,10 +87,10 @@ def test_half_a_recording_at_a_lower_rate_is_used_or_said_not_to_be(slower: int,
 
 
 def test_between_quick_stretches_the_slow_ones_are_as_far_apart_as_they_are() -> None:
-    """A cell that is logged ten times a second in each pulse, and every ten seconds while it rests."""
+    """A cell that is logged ten times a second in each pulse, and every ten seconds while it is charged again."""
     pulse, rest = np.arange(0.0, 40.0, 0.1), 40.0 + np.arange(0.0, 2000.0, 10.0)
     time_s = np.concatenate([start + np.concatenate([pulse, rest]) for start in (0.0, 2040.0)])
-    load = np.where(np.fmod(time_s, 2040.0) < 40.0, 5.0, 0.0)
+    load = np.where(np.fmod(time_s, 2040.0) < 40.0, 5.0, 1.0 + np.sin(time_s))
     run = Recording.from_arrays(time_s=time_s, force_n=load, cell_v=3.0 + 0.1 * load)
     (said,) = limit_slow_stretches(run, np.ones(len(run), dtype=bool), 0.35, STANDARD)
     assert "samples are 10 s apart there; to follow this load, fits need one every 0.35 s" in said
@@ -106,3 +107,21 @@ def test_nothing_is_said_of_what_is_logged_evenly_or_shakes() -> None:
         pressure_mbar=run.sensor.values,
     )
     assert limit_slow_stretches(shaken, usable, 0.035, STANDARD) == []
+
+
+def test_a_hold_may_be_logged_ever_more_slowly() -> None:
+    """Relaxation tests are: no load moves between the samples, so that no fit has to follow one there."""
+    ramp, hold = np.arange(0.0, 10.0, 0.02), 10.0 + np.geomspace(0.02, 290.0, 120)
+    time_s = np.concatenate([start + np.concatenate([ramp, hold]) for start in (0.0, 300.02)])
+    load = 40.0 * np.minimum(np.fmod(time_s, 300.02), 10.0)
+    noise = 0.02 * np.random.default_rng(4).standard_normal(time_s.size)
+    runs = [
+        Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=0.25 * load + noise, name=name)
+        for name in ("one", "other")
+    ]
+    ready = prepared(runs, 2, examine(runs, STANDARD), STANDARD)
+    assert not any("of it is not used" in one for one in ready.limits)
+    for one in ready.sessions:
+        held = one.conditions.load > 0.99
+        assert one.usable[held].mean() > 0.99
+        assert np.allclose(one.reading[held & one.usable], one.conditions.load[held & one.usable], atol=0.002)
