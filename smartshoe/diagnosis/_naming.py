@@ -163,8 +163,12 @@ def _law_in_its_place(one: Member) -> Alternative | None:
 
 
 def _other_laws_of_family(law: Effect) -> tuple[str, ...]:
-    """The other laws of a law's family, and those that count as its members."""
-    return tuple(one.name for one in catalogue().values() if one.kind == law.kind and one is not law)
+    """The other laws of a law's family, and those that count as its members.
+
+    Without constant shifts: each recording has an offset of its own, so that what a model adds is none.
+    """
+    family = (one for one in catalogue().values() if one.kind == law.kind and one.shifts is None)
+    return tuple(one.name for one in family if one is not law)
 
 
 def _nearest_of_kind(block: Member) -> Effect:
