@@ -59,9 +59,10 @@ def logged_on_grid(
     good, known = (one[nearest] & is_near | spacing.followed(one) for one in (good, known))
     on_grid = np.interp(even, time_s, reading)
     if is_judged:
-        course = smoothed(reading, thinning_weights(1, reading.size), 1)  # shows how far to go from the sample to the grid's moment
-        moved = reading[nearest] + np.interp(even, time_s, course) - course[nearest]
-        on_grid = np.where(is_near, moved, on_grid)
+        # How far a reading goes between its sample and the grid's moment shows in averages of both over the same samples.
+        course_s, course = (smoothed(one, thinning_weights(1, one.size), 1) for one in (time_s, reading))
+        moved = np.interp(even, course_s, course) - np.interp(time_s[nearest], course_s, course)
+        on_grid = np.where(is_near, reading[nearest] + moved, on_grid)
     return Logged(
         even,
         np.interp(even, time_s, load_n),

@@ -139,7 +139,7 @@ def infer(
         if not other.is_reduced and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
     found, members = _best_by_single_changes(found, plain, sessions, progress)
-    if any(found.fit.model.freed(name) is not None for name in found.fit.model.names):
+    if found.fit.model.ended:
         wider = _validated(beyond_bounds(state_at(found.fit, state.banned), progress), plain, sessions)
         if not wider.is_reduced and error_of(sessions, wider.fit.model) < error_of(sessions, found.fit.model):
             found, members = _best_by_single_changes(wider, plain, sessions, progress)

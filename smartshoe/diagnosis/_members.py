@@ -240,8 +240,8 @@ def _other_laws(
         if law.is_flexible or not is_other or law.name in (one.name, *reduced.model.names):
             continue
         fitted = fit_with(law, reduced.model, likelihood, shapes.get(law.name, ())[:RIVALS], base)
-        if (freed := fitted.model.freed(law.name)) is not None:
-            fitted = fit(likelihood, freed, FEW_STEPS)
+        if law.name in fitted.model.ended:
+            fitted = fit(likelihood, fitted.model.freed(law.name), FEW_STEPS)
         is_bent = has_arm_beyond_memory(fitted.model, likelihood.thresholds) and not has_extreme_arm(extended.model)
         if is_bent and has_extreme_arm(fit(likelihood, fitted.model).model):
             # An arm that no wall has follows what the law misses: compare the law beside the arm that was found

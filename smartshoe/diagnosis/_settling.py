@@ -81,13 +81,14 @@ def beyond_bounds(state: State, progress: Progress) -> State:
 
     It is also fitted without each other effect, which may be there only for what the law missed at its bound.
     """
-    for name in state.fit.model.names:
-        if name not in state.fit.model.names or (freed := state.fit.model.freed(name)) is None:
-            continue  # it went with another one, or has no farther bound where it is
+    for name in state.fit.model.ended:
+        if name not in state.fit.model.ended:
+            continue  # it went with another one
         progress(f"trying {listed([name])} beyond its usual bounds")
         likelihood = state.likelihood()
-        found = fit(likelihood, freed)
-        fits = [found, *(fit(likelihood, found.model.without(other)) for other in freed.names if other != name)]
+        found = fit(likelihood, state.fit.model.freed(name))
+        others = [other for other in found.model.names if other != name]
+        fits = [found, *(fit(likelihood, found.model.without(other)) for other in others)]
         odds = state.evidence.odds
         best = min(fits, key=lambda one: with_odds(one.cost, one.model, odds))
         if _is_simpler(best, state):

@@ -126,15 +126,16 @@ class ExtendedModel:
         """The part of the effect ``name``; raises `KeyError` where the model has none."""
         return {part.name: part for part in self.parts}[name]
 
-    def freed(self, name: str) -> ExtendedModel | None:
-        """This model with the effect ``name`` free of the bounds that it ended at (`Effect.widened_at`), if there are.
+    @property
+    def ended(self) -> tuple[str, ...]:
+        """The names of effects at a bound beyond which there is a farther one."""
+        return tuple(part.name for part in self.parts if part.effect.widened_at(part.values) is not part.effect)
 
-        None where it has no farther bound there.
-        """
+    def freed(self, name: str) -> ExtendedModel:
+        """This model with the effect ``name`` free of the bounds that it ended at (`Effect.widened_at`)."""
         at = self.part(name)
-        wider = at.effect.widened_at(at.values)
-        parts = (replace(part, effect=wider) if wider is not None and part is at else part for part in self.parts)
-        return None if wider is None else replace(self, parts=tuple(parts))
+        wider = replace(at, effect=at.effect.widened_at(at.values))
+        return replace(self, parts=tuple(wider if part is at else part for part in self.parts))
 
     def without(self, *names: str) -> ExtendedModel:
         """This model without the named effects; itself where it has none of them."""

@@ -53,6 +53,7 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
 class _Model(str):
     parts: tuple[Any, ...] = ()
+    ended: tuple[str, ...] = ()
 
 
 class _Sure(float):
@@ -66,7 +67,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
         unlikely=(), changeable=[], names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={},
-        best_single=None, weighed=[],
+        best_single=None, weighed=[], ended={},
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -89,7 +90,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def judged(one: Any, plain: Any, sessions: Any) -> Any:
         model = _Model(one.name)
-        model.parts = told.parts.get(one.name, ())
+        model.parts, model.ended = told.parts.get(one.name, ()), told.ended.get(one.name, ())
         return SimpleNamespace(
             members=lambda: told.members,
             together=lambda members: (tuple(members), "together"),
@@ -126,12 +127,13 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "simpler_from", simpler_from)
     monkeypatch.setattr(_inference, "simpler", lambda other, one: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "latency_with_usual_arm", named("late"))
-    monkeypatch.setattr(_inference, "state_at", lambda late: late)
+    monkeypatch.setattr(_inference, "state_at", lambda late, banned=(): late)
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
     monkeypatch.setattr(_inference, "with_creeping_arm", named("creeping"))
     monkeypatch.setattr(_inference, "with_laws", lambda one, model: told.lawful or one)
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one: lawful if told.is_law else one)
+    monkeypatch.setattr(_inference, "beyond_bounds", lambda one, progress: state(f"freed {one.model}"))
     monkeypatch.setattr(_inference, "with_own_terms", lambda state, sessions: None)
     monkeypatch.setattr(_inference, "_validated", judged)
     monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
@@ -307,6 +309,19 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     assert flow.infer().fit.model == "law other settled first"
 
 
+def test_what_ended_at_a_bound_goes_on_beyond_it_where_that_is_validated_and_leaves_less(flow: Any) -> None:
+    flow.ended, flow.errors = {"settled first": ("creep",)}, {"freed settled first": 0.9}
+    assert flow.infer().fit.model == "freed settled first"
+    flow.changes = [["law"], []]
+    assert flow.infer().fit.model == "law freed settled first"
+    flow.stepped = ("freed settled first",)
+    assert flow.infer().fit.model == "settled first"
+    flow.stepped, flow.errors = (), {"freed settled first": 1.0}
+    assert flow.infer().fit.model == "settled first"
+    flow.ended, flow.errors = {}, {"freed settled first": 0.9}
+    assert flow.infer().fit.model == "settled first"
+
+
 def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> None:
     """And it is the answer where nothing else is left."""
     least = STANDARD.least_confidence
@@ -314,7 +329,7 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     assert flow.infer().best_single is None
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
-        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))),
+        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",), ended=())),
         cancelling_names=(), members=lambda: ("curve",), together=lambda members: "a curve alone",
     )  # fmt: skip
     flow.best_single = "a curve", judged

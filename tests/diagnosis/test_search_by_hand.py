@@ -323,9 +323,11 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
     def fitted(law: Any, model: Any, likelihood: Any, shapes: Any, beside: Any) -> Any:
         tried.append((law.name, list(shapes)))
         assert beside.names == ()
-        return SimpleNamespace(cost=110.0, model=model)
+        return SimpleNamespace(cost=110.0, model=model.with_part(law, ends.pop()))
 
+    ends = [[0.1, 120.0], [0.1, 119.0]]
     monkeypatch.setattr(_members, "fit_with", fitted)
+    monkeypatch.setattr(_members, "fit", lambda likelihood, model, steps: SimpleNamespace(cost=104.0, model=model))
     monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: [law])
     less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
     one: Any = SimpleNamespace(name="power_law_creep", effect=effect("power_law_creep"))
@@ -333,6 +335,8 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
     (other,) = _other_laws(one, less, extended, found, is_at_end_of_kind=False)
     assert (other.effect, other.margin) == (law.name, 10.0)
     assert tried == [(law.name, [shapes[2], shapes[0]])]
+    (freed,) = _other_laws(one, less, extended, found, is_at_end_of_kind=False)
+    assert (freed.effect, freed.margin) == (law.name, 4.0)  # its time constant ended at a bound, beyond which it goes on
 
 
 @pytest.mark.parametrize("goes_on", [True, False])

@@ -292,14 +292,14 @@ class Effect(ABC):
         """The effect for a reading that is no pressure: stress, or the conduction of a polymer, may fall in holds."""
         return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
 
-    def widened_at(self, values: Array) -> Effect | None:
-        """The effect with each bound that ``values`` lie at moved to the ``farthest``; None where there is none."""
+    def widened_at(self, values: Array) -> Effect:
+        """The effect with each bound that ``values`` lie at moved to the ``farthest``; itself where there is none."""
         wider = tuple(
             p.widened if not p.widened.is_stretched(v) and p.is_stretched(v) else p
             for p, v in zip(self.parameters, map(float, values), strict=True)
         )
         if wider == self.parameters:
-            return None
+            return self
         variant = copy(self)
         vars(variant).update(parameters=wider)
         return variant
