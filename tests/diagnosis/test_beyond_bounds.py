@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 # Units that creep by what each newton has been there for: c (t/10 s)^alpha, and a wall with two relaxations.
 CREEPS = {
     ("power_law_creep", alpha, share): lambda t_s, alpha=alpha, share=share: share * (t_s / 10.0) ** alpha
-    for alpha, share in ((0.2, 0.2), (0.3, 0.2), (0.4, 0.1))
+    for alpha, share in ((0.2, 0.2), (0.3, 0.2), (0.35, 0.1))
 } | {
     ("second_relaxation", tau_s, share): lambda t_s, tau_s=tau_s, share=share: (
         0.08 * (1.0 - np.exp(-t_s / 1.5)) + share * (1.0 - np.exp(-t_s / tau_s))

@@ -336,7 +336,7 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
     assert (other.effect, other.margin) == (law.name, 10.0)
     assert tried == [(law.name, [shapes[2], shapes[0]])]
     (freed,) = _other_laws(one, less, extended, found, is_at_end_of_kind=False)
-    assert (freed.effect, freed.margin) == (law.name, 4.0)  # its time constant ended at a bound, beyond which it goes on
+    assert (freed.effect, freed.margin) == (law.name, 4.0)  # freed of the bound it ended at
 
 
 @pytest.mark.parametrize("goes_on", [True, False])

@@ -15,7 +15,9 @@ class SecondRelaxation(CoreEffect):
     says = "the wall relaxes with a second time constant: the reading creeps up in holds and back in rests"
     parameters = (
         EffectParameter("share", "1", "stiffness of the second arm over that of gas and k1", 0.0, 0.0, 2.0, 0.02),
-        EffectParameter("time_constant", "s", "its relaxation time", None, 0.05, 120.0, 5.0, kind_ends="both", farthest=1000.0),
+        EffectParameter(
+            "time_constant", "s", "its relaxation time", None, 0.05, 120.0, 5.0, kind_ends="both", farthest=1000.0
+        ),
     )
     shapes = tuple({"time_constant": tau} for tau in (0.3, 1.2, 5.0, 20.0, 60.0))
     exposed_by = by("holds", "rates", "rests")
