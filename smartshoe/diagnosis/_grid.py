@@ -59,7 +59,7 @@ def logged_on_grid(
     good, known = (one[nearest] & is_near | spacing.followed(one) for one in (good, known))
     on_grid = np.interp(even, time_s, reading)
     if is_judged:
-        # How far a reading goes between its sample and the grid's moment shows in averages of both over the same samples.
+        # How far a reading goes from its sample to the grid's moment: by averages of both over the same samples.
         course_s, course = (smoothed(one, thinning_weights(1, one.size), 1) for one in (time_s, reading))
         moved = np.interp(even, course_s, course) - np.interp(time_s[nearest], course_s, course)
         on_grid = np.where(is_near, reading[nearest] + moved, on_grid)

@@ -17,7 +17,8 @@ from smartshoe.signals.masks import bridged, runs_of
 class Spacing:
     """For moments (m,): the next sample ``after`` each, and the distance of the two samples around it.
 
-    ``is_close``: close enough for fits to follow, or under a load that stands still between them. ``is_even``: as far apart as those nearby, so that there is no gap.
+    ``is_close``: close enough for fits to follow, or under a load that stands still between them. ``is_even``: as far
+    apart as those nearby, so that there is no gap.
     """
 
     after: Index
