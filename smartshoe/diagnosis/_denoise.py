@@ -60,11 +60,14 @@ def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float
     return share if share > 1.0 - thresholds.same else 0.0
 
 
-def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds) -> tuple[Array, float]:
-    """The load (n,) without noise of standard deviation ``sd``, and the standard deviation of what remains of it."""
+def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds) -> tuple[Array, float, Array]:
+    """The load (n,) without noise of standard deviation ``sd``, and the standard deviation of what remains of it.
+
+    With it (n,) the share of the noise's variance that remains at each sample.
+    """
     least = thresholds.few + 2  # samples of a line: a few more than it has parameters
     if sd == 0.0 or load.size < thresholds.least_samples:
-        return load, sd
+        return load, sd, np.ones(load.size)
     best = load.copy()
     variance = np.ones(load.size)
     squares = load - load.mean()
@@ -84,7 +87,7 @@ def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds)
             better = fits & (leverage < variance[here])
             best[here][better] = (mean + slope * away)[better] + load.mean()
             variance[here][better] = leverage
-    return best, sd * float(np.sqrt(variance.mean()))
+    return best, sd * float(np.sqrt(variance.mean())), variance
 
 
 def _lines(signal: Array, half: int) -> tuple[Array, Array, Array, float]:

@@ -44,7 +44,7 @@ def own_lags(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thre
     count = int(is_fitted.sum())
     if count < 2 or any("continues" in one.recording.metadata for one in usable):
         return None
-    lags_s, squares, sds = np.transpose([_lag_of(one, model) for one in usable])
+    lags_s, squares, sds, _ = np.transpose([_lag_of(one, model) for one in usable])
     fitted_s, weights = lags_s[is_fitted], sds[is_fitted] ** -2
     off_s = fitted_s - weights @ fitted_s / weights.sum()
     samples = sum(int(one.fitted.sum()) for one in usable)
@@ -59,8 +59,36 @@ def own_lags(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thre
     return OwnLags({one.index: float(lag_s) for one, lag_s in zip(usable, lags_s, strict=True)}, are_about_mean)
 
 
+def lags_of_judged(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> dict[int, float]:
+    """By how much each held-out recording is later in s than the fitted ones, by its place; only those that are.
+
+    It must differ from the fitted recordings' mean for certain (chi-square, `false_alarm`), and without it the reading
+    would be off by more than ``tolerable`` and by more than half of the squares (`clear`): a recording that judges is
+    judged on its own clock, as with its own offset.
+    """
+    judged = [one for one in sessions if one.judged.any() and not one.fitted.any()]
+    fitted = [one for one in sessions if one.fitted.any()]
+    if not (judged and fitted):
+        return {}
+    lags_s, _, sds, _ = np.transpose([_lag_of(one, model) for one in fitted])
+    weights = sds**-2
+    mean_s, variance = weights @ lags_s / weights.sum(), 1.0 / weights.sum()
+    found = {}
+    for one in judged:
+        lag_s, squares, sd_s, left = _lag_of(one, model)
+        off_s = float(lag_s - mean_s)
+        moved = squares * off_s**2
+        is_certain = off_s**2 > chdtri(1, thresholds.false_alarm) * (sd_s**2 + variance)
+        is_most = moved > (thresholds.clear - 1.0) * left
+        if is_certain and is_most and moved > thresholds.tolerable**2 * int(one.judged.sum()):
+            found[one.index] = off_s
+    return found
+
+
 def _lag_of(session: Session, model: ExtendedModel) -> Array:
-    """(3,) by how much the reading is later than the model's in s, the sum of squared slopes, and the lag's deviation.
+    """(4,) by how much the reading is later than the model's in s, the sum of squared slopes, the lag's deviation.
+
+    The last is the sum of the squares that are left.
 
     By least squares beside the recording's own nuisances, with noise counted once per correlation time. Four steps of
     Gauss and Newton, since the slopes of a late reading are late too.
@@ -77,4 +105,4 @@ def _lag_of(session: Session, model: ExtendedModel) -> Array:
         step_s = float(falls @ left) / squares
         lag_s += step_s
     rest[mask] = left - step_s * falls
-    return np.array([lag_s, squares, effective_noise_sd([rest], [mask]) / np.sqrt(squares)])
+    return np.array([lag_s, squares, effective_noise_sd([rest], [mask]) / np.sqrt(squares), rest @ rest])

@@ -40,7 +40,7 @@ from smartshoe.diagnosis._limits import (
 )
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_with_memory, noise_without_memory
-from smartshoe.diagnosis._own_lags import own_lags
+from smartshoe.diagnosis._own_lags import lags_of_judged, own_lags
 from smartshoe.diagnosis._own_terms import own_terms_of, residual_of
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
@@ -89,6 +89,9 @@ def diagnosed(
         left, before = error_of(again.sessions, other.fit.model), error_of(given.sessions, found.fit.model)
         if thresholds.clear * left**2 <= before**2:
             integrity, given, found = on_one_clock, again, other
+    if late_s := lags_of_judged(given.sessions, found.fit.model, thresholds):
+        integrity = integrity.with_judged_lags(late_s)
+        given = prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
     progress("judging on held-out data")
     noise = noise_without_memory(given.fine, found.fit.model, integrity.faults, thresholds.material)

@@ -32,11 +32,15 @@ from smartshoe.signals.masks import runs_of
 
 @dataclass(frozen=True, eq=False)
 class DenoisedLoad:
-    """The ``load`` (n,) without its noise; standard deviations of that noise before (``raw_sd``) and after."""
+    """The ``load`` (n,) without its noise; standard deviations of that noise before (``raw_sd``) and after.
+
+    ``noise_left`` (n,): the share of that noise's variance that is left: all where no straight line goes through.
+    """
 
     load: Array
     raw_sd: float
     remaining_sd: float
+    noise_left: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,6 +214,7 @@ def _session(
         neighbour=auxiliary.get("neighbour"),
         before=past.sums,
         earlier=past.load_every(step_s * factor),
+        load_noise_left=denoised.noise_left[::factor],
     )
     coverage = smoothed(logged.usable.astype(float), weights, factor)
     # A reading that is logged at a fraction of the load's rate never fills a window.
@@ -246,5 +251,6 @@ def _session(
 def _denoised_load(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> DenoisedLoad:
     """The load (n,) without noise and with the reading's sampling jitter, both in shares of full scale."""
     raw_sd = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
-    denoised, remaining_sd = without_noise(load, step_s, raw_sd, thresholds)
-    return DenoisedLoad(with_sampling_jitter(denoised, reading, step_s, thresholds), raw_sd, remaining_sd)
+    denoised, remaining_sd, noise_left = without_noise(load, step_s, raw_sd, thresholds)
+    jittered = with_sampling_jitter(denoised, reading, step_s, thresholds, noise_left)
+    return DenoisedLoad(jittered, raw_sd, remaining_sd, noise_left)

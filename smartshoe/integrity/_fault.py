@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -120,3 +120,21 @@ class Integrity:
         before_s = (0.0,) * len(self.clock_offset_s) if were_in_model else self.clock_offset_s
         offsets_s = tuple(offset_s + lags_s.get(place, 0.0) for place, offset_s in enumerate(before_s))
         return replace(self, clock_offset_s=offsets_s, one_clock=None, are_about_mean=are_about_mean)
+
+    def with_judged_lags(self, lags_s: Mapping[int, float]) -> Integrity:
+        """The same where recordings that only judge lag by ``lags_s`` more than the fitted ones, by their places."""
+        offsets_s, rates, others = [*self.clock_offset_s], [*self.clock_rate], {*self.others}
+        is_moved = any(offset_s or rate for place, offset_s, rate in self._clocks if place not in others | {*lags_s})
+        for place, lag_s in lags_s.items():
+            if self.one_clock is not None and place not in others:
+                middle_s = np.array(0.5 * self.recordings[place].duration_s)
+                offsets_s[place], rates[place] = float(self.one_clock.lag_s(middle_s)), self.one_clock.rate
+            offsets_s[place] += lag_s
+            if self.one_clock is not None or not is_moved:
+                others.add(place)  # else each is moved to its own load's clock
+        return replace(self, clock_offset_s=tuple(offsets_s), clock_rate=tuple(rates), others=frozenset(others))
+
+    @property
+    def _clocks(self) -> Iterator[tuple[int, float, float]]:
+        """Place, lag and rate of each recording."""
+        return zip(range(len(self.clock_rate)), self.clock_offset_s, self.clock_rate, strict=True)

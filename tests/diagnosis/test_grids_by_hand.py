@@ -134,7 +134,7 @@ def test_a_load_is_without_its_noise_and_level_at_rest_and_what_is_left_is_said(
     read = load - 1e-3 * np.random.default_rng(6).standard_normal(801)  # which does not follow the load's noise
     session = _prepared(_pressed(load, read), factor=factor)
     raw = noise_sd(load, STANDARD)
-    quiet, left = without_noise(load, STEP_S, raw, STANDARD)
+    quiet, left, _ = without_noise(load, STEP_S, raw, STANDARD)
     assert session.denoised.raw_sd == pytest.approx(raw)
     assert session.denoised.remaining_sd == pytest.approx(left)
     assert session.denoised.load == pytest.approx(quiet)

@@ -461,10 +461,10 @@ def test_corners_stay_and_noise_goes_as_far_as_is_said() -> None:
     load = triangles(30, rest_s=1.0)
     sd = 1e-3
     noisy = load + sd * np.random.default_rng(3).standard_normal(load.size)
-    quiet, left = without_noise(noisy, STEP_S, sd, STANDARD)
+    quiet, left, _ = without_noise(noisy, STEP_S, sd, STANDARD)
     assert left < 0.7 * sd
     assert np.sqrt(np.mean((quiet - load) ** 2)) == pytest.approx(left, rel=0.25)
-    same, none = without_noise(load, STEP_S, 0.0, STANDARD)
+    same, none, _ = without_noise(load, STEP_S, 0.0, STANDARD)
     assert same is load
     assert none == 0.0
     assert noise_sd(np.zeros(5), STANDARD) == 0.0

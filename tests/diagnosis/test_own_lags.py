@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._own_lags import OwnLags, own_lags
+from smartshoe.diagnosis._own_lags import OwnLags, lags_of_judged, own_lags
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.models.effects import Conditions
@@ -93,3 +93,31 @@ def test_what_a_good_units_imperfections_add_up_to_decides_how_far_clocks_may_di
     runs = _sessions(_late("early", 0.0, 6.0, 1), _late("late", 0.02, 7.0, 2))
     assert own_lags(runs, MODEL, STANDARD) is not None
     assert own_lags(runs, MODEL, replace(STANDARD, tolerable=0.02)) is None
+
+
+@given(lags, lags, st.integers(0, 99))
+def test_a_recording_that_judges_shows_its_own_clock_to_a_millisecond(
+    fitted_s: float, judged_s: float, seed: int
+) -> None:
+    """Relative to the fitted ones, whose delay is the model's, or stays in what it leaves."""
+    runs = (
+        _late("one", fitted_s, 6.0, seed),
+        _late("other", fitted_s, 7.0, seed + 1),
+        _late("w", judged_s, 5.0, seed + 2),
+    )
+    found = lags_of_judged(_sessions(*runs, held_out=1), MODEL, STANDARD)
+    apart_s = judged_s - fitted_s
+    if abs(apart_s) > 0.006:
+        assert found == {2: pytest.approx(apart_s, abs=0.001)}
+    if abs(apart_s) < 0.001:  # small imperfections do as much
+        assert found == {}
+    assert lags_of_judged(_sessions(*runs[:2]), MODEL, STANDARD) == {}
+    assert lags_of_judged(_sessions(*runs), MODEL, STANDARD) == {}
+
+
+def test_a_lag_that_leaves_most_of_what_a_recording_is_off_by_is_no_clock() -> None:
+    """Of another unit, whose arm is another: its readings are late as well, but no shift makes them the same."""
+    runs = [_late("one", 0.0, 6.0, 1), _late("other", 0.0, 7.0, 2), _late("w", 0.004, 5.0, 3)]
+    share = runs[2].sensor.values
+    runs[2] = runs[2].with_channel(runs[2].sensor.with_values(share + 2.0 * np.sin(TIME_S)))
+    assert lags_of_judged(_sessions(*runs, held_out=1), MODEL, STANDARD) == {}

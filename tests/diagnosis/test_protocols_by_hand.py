@@ -146,7 +146,7 @@ def _session(load: Array, step_s: float = 0.1, thinned: int = 3, resting: Any = 
         np.zeros(load.size, dtype=np.intp),
         at_rest,
         thinned,
-        DenoisedLoad(load, 0.0, 0.0),
+        DenoisedLoad(load, 0.0, 0.0, np.ones(load.size)),
     )
 
 

@@ -259,6 +259,33 @@ def test_one_that_judges_and_drifts_by_itself_is_moved_by_what_it_tells(late_s: 
     assert f"by {found.rates[2]:.2g} s " in ready.says[0]
 
 
+@pytest.mark.parametrize(
+    ("offsets_s", "shared", "shift_s", "of_fitted"),
+    [
+        ((0.0, 0.0, 0.0), None, 0.02, True),
+        ((0.03, 0.01, 0.015), None, 0.035, False),  # each is moved to its own load
+        ((0.5, 0.5, 0.5), OneClock(0.5, 0.0), 0.02, True),  # a model bears what all share
+        ((0.0, 0.0, 0.0), OneClock(0.5, 0.0), 0.02, True),  # too little to be told
+    ],
+)
+def test_one_that_judges_is_moved_by_its_lag_relative_to_the_fitted_ones(
+    offsets_s: tuple[float, ...], shared: OneClock | None, shift_s: float, of_fitted: bool
+) -> None:
+    runs = [_run(0.0, seed) for seed in range(3)]
+    masks = tuple(np.ones(len(one), dtype=bool) for one in runs)
+    before = Integrity(tuple(runs), (), masks, offsets_s, (0.0,) * 3, shared, ())
+    after = before.with_judged_lags({2: 0.02})
+    assert after.clock_offset_s[:2] == before.clock_offset_s[:2]
+    assert after.one_clock == before.one_clock
+    ready = aligned(runs, after)
+    said = ready.says[-1]
+    assert 2 in ready.moved
+    assert f"by {shift_s:g} s" in said
+    assert ("those of the fitted recordings" in said) == of_fitted
+    again = aligned(runs, after.with_judged_lags({2: -0.03}))  # on top of the first
+    assert f"by {abs(shift_s - 0.03):g} s" in again.says[-1]
+
+
 def _ready(runs: list[Recording], found: Clocks, usable: list[NDArray[np.bool_]] | None = None) -> Aligned:
     masks = usable or [np.ones(len(one), dtype=bool) for one in runs]
     return aligned(

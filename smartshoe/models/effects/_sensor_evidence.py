@@ -72,20 +72,28 @@ class Waveformless:
 
 @dataclass(frozen=True, eq=False)
 class LocalVariance:
-    """Variance (m,) of the residual's fast part in blocks, and squares of pressure and slope (m,) it may follow."""
+    """Variance (m,) of the residual's fast part in blocks, and what it may follow.
+
+    That is squares of pressure and slope (m,), and the share (m,) of the load's noise that is in the prediction.
+    """
 
     variance: Array
     pressure_squared: Array
     slope_squared: Array
+    load_noise: Array
 
 
 TRIPLETS = 4  # in a block, which stays short: the log of its variance has the variance psi'(2)
 LOG_SD = sqrt(pi**2 / 6.0 - 1.0)
-PRESSURE, SLOPE = 1, 2
+PRESSURE, SLOPE, LOAD = 1, 2, 3
 
 
-def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> LocalVariance | None:
+def local_variance(
+    residual: Array, prediction: Array, sample_time_s: float, load_noise_left: Array | None = None
+) -> LocalVariance | None:
     """`LocalVariance` from second differences of separate triplets of samples.
+
+    ``load_noise_left`` (n,): the share of the variance of the load's noise that is in the prediction.
 
     Second differences hold neither a smooth misfit nor slow noise. Triplets at a corner of the prediction are left out,
     since a model that is late leaves its corners in the residual. None where too few samples are left, or where the
@@ -110,18 +118,23 @@ def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> 
     def means(values: Array) -> Array:
         return np.asarray(values[smooth][:whole].reshape(-1, TRIPLETS).mean(axis=1))
 
-    return LocalVariance(means(fast**2), means(prediction[1:n:3] ** 2), means(slope**2))
+    noise = (
+        np.zeros(fast.size)
+        if load_noise_left is None
+        else load_noise_left[:n].reshape(-1, 3) @ np.array([1.0, 4.0, 1.0]) / 6.0
+    )
+    return LocalVariance(means(fast**2), means(prediction[1:n:3] ** 2), means(slope**2), means(noise))
 
 
 def growing_noise(
-    residual: Array, prediction: Array, sample_time_s: float, asked: int
+    residual: Array, prediction: Array, sample_time_s: float, asked: int, load_noise_left: Array | None = None
 ) -> tuple[float, float, LocalVariance] | None:
     """Score, strength and `LocalVariance` where the residual's variance grows with the ``asked`` part; None elsewhere.
 
-    ``asked`` is `PRESSURE` or `SLOPE`; growth with the other part is fitted apart. The test has one false alarm in
-    1000.
+    ``asked`` is `PRESSURE` or `SLOPE`; growth with the other part is fitted apart, and so is what noise of the load
+    brings where it is left (``load_noise_left``). The test has one false alarm in 1000.
     """
-    local = local_variance(residual, prediction, sample_time_s)
+    local = local_variance(residual, prediction, sample_time_s, load_noise_left)
     if local is None:
         return None
     value, growth = variance_score(local, asked)
@@ -164,13 +177,15 @@ def _second_difference(triplets: Array) -> Array:
 def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
     """Score statistic (standard normal without the effect) and coefficient of the ``asked`` part of the variance.
 
-    The variance is modelled as a constant, a part with the square of pressure (`PRESSURE`) and one with that of the
-    slope (`SLOPE`). The other part is fitted first, so that neither stands in for the other. The score is of
-    logarithms: few blocks are steep, and their squares are too skewed for a normal law at one in a thousand.
+    The variance is modelled as a constant, a part with the square of pressure (`PRESSURE`), one with that of the slope
+    (`SLOPE`), and one where the load's noise is left (`LOAD`). The other parts are fitted first, so that none stands in for
+    another. The score is of logarithms: few blocks are steep, and their squares are too skewed for a normal law at one
+    in a thousand.
     """
-    columns = np.stack([np.ones(local.variance.size), local.pressure_squared, local.slope_squared], axis=1)
+    ways = np.ones(local.variance.size), local.pressure_squared, local.slope_squared, local.load_noise
+    columns = np.stack(ways, axis=1)
     columns = columns / np.maximum(columns.max(axis=0), 1e-300)
-    other = [0, SLOPE if asked == PRESSURE else PRESSURE]
+    other = [0, SLOPE if asked == PRESSURE else PRESSURE, LOAD]
     without = columns @ _variances(columns, local.variance, other)
     scores = columns / without[:, None]
     standard = np.log(np.maximum(local.variance, 1e-9 * without) / without)
@@ -182,12 +197,12 @@ def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
     if length <= 1e-9 * float(np.sqrt(scores[:, asked] @ scores[:, asked])):
         return 0.0, 0.0
     spread = max(float(np.std(standard)), LOG_SD)
-    found = _variances(columns, local.variance, [0, 1, 2])
+    found = _variances(columns, local.variance, [0, PRESSURE, SLOPE, LOAD])
     return float(direction @ standard) / (spread * length), float(found[asked])
 
 
 def _variances(columns: Array, variance: Array, used: list[int]) -> Array:
-    """Coefficients (3,), none below 0, of the ``used`` ``columns`` (m, 3) in ``variance`` (m,): weighted least squares.
+    """Coefficients (k,), none below 0, of the ``used`` ``columns`` (m, 3) in ``variance`` (m,): weighted least squares.
 
     The weights are those of squares of noise, whose standard deviation is in proportion to their mean.
     """

@@ -89,7 +89,8 @@ class Conditions:
     """What a block may know beside its signal: one session (the unit at rest and zeroed before) on an even grid.
 
     ``time_s`` (n,) from the session's start at a step of ``step_s``; ``load`` (n,) the measured load as a share of full
-    scale; ``load_noise`` the standard deviation of its noise. ``before``: what an earlier recording left behind
+    scale; ``load_noise`` the standard deviation of its noise, and ``load_noise_left`` (n,) the share of its variance
+    that is left where the load was smoothed, if that is known. ``before``: what an earlier recording left behind
     (largest load, cycles, time, dose) where this one continues it; ``earlier`` (m,): the load up to then on the same
     step, (0,) where it continues none. ``temperature_k`` (n,) above the first value of the first session, and
     ``neighbour`` (n,), the pressure of another unit as a share of this unit's full scale, are None where not logged.
@@ -106,6 +107,7 @@ class Conditions:
     before: Mapping[str, float] = field(default_factory=dict)
     earlier: Array = field(default_factory=lambda: np.zeros(0))
     relaxing: tuple[float, float] | None = None
+    load_noise_left: Array | None = None
     cache: dict[str, Array] = field(default_factory=dict, repr=False)
     """What blocks derive from the load alone (largest so far, cycles done), by name."""
     _kept: dict[str, dict[tuple[float, ...], Array]] = field(default_factory=dict, init=False, repr=False)

@@ -29,7 +29,7 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
         """Whether the variance of ``residual`` grows with ``prediction``; growth with its slope is fitted apart."""
-        found = growing_noise(residual, prediction, conditions.step_s, PRESSURE)
+        found = growing_noise(residual, prediction, conditions.step_s, PRESSURE, conditions.load_noise_left)
         if found is None:
             return None
         value, strength, _ = found
