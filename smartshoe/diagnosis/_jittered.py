@@ -13,9 +13,7 @@ from smartshoe.models.effects import timing_jitter
 PASSES = 3
 
 
-def with_sampling_jitter(
-    load: Array, reading: Array, step_s: float, thresholds: Thresholds, load_noise_left: Array | None = None
-) -> Array:
+def with_sampling_jitter(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> Array:
     """``load`` (n,) smoothed by the sampling jitter of ``reading`` (n,); both in shares of full scale.
 
     A sample taken early or late by a random time of standard deviation s reads, on average, what a Gaussian window of s
@@ -24,7 +22,7 @@ def with_sampling_jitter(
     """
     smoothed = load
     for _ in range(PASSES):
-        sd_s = jitter_s(smoothed, reading, step_s, load_noise_left)
+        sd_s = jitter_s(smoothed, reading, step_s)
         if not 0.0 < sd_s <= thresholds.echo_s:  # longer than any echo, it is no jitter of a usable clock
             return load
         smoothed = np.asarray(gaussian_filter1d(load, sd_s / step_s, mode="nearest"))
@@ -32,10 +30,10 @@ def with_sampling_jitter(
     return smoothed if after > before else load
 
 
-def jitter_s(load: Array, reading: Array, step_s: float, load_noise_left: Array | None = None) -> float:
+def jitter_s(load: Array, reading: Array, step_s: float) -> float:
     """Standard deviation of the sampling time in s, from noise that follows the slope; 0 where it does not."""
     scale = float(np.dot(load, load))
     if scale == 0.0:
         return 0.0
     prediction = load * float(np.dot(load, reading)) / scale
-    return timing_jitter.jitter_s(reading - prediction, prediction, step_s, load_noise_left)
+    return timing_jitter.jitter_s(reading - prediction, prediction, step_s)

@@ -252,5 +252,4 @@ def _denoised_load(load: Array, reading: Array, step_s: float, thresholds: Thres
     """The load (n,) without noise and with the reading's sampling jitter, both in shares of full scale."""
     raw_sd = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
     denoised, remaining_sd, noise_left = without_noise(load, step_s, raw_sd, thresholds)
-    jittered = with_sampling_jitter(denoised, reading, step_s, thresholds, noise_left)
-    return DenoisedLoad(jittered, raw_sd, remaining_sd, noise_left)
+    return DenoisedLoad(with_sampling_jitter(denoised, reading, step_s, thresholds), raw_sd, remaining_sd, noise_left)

@@ -1,4 +1,4 @@
-"""A load cell's noise stays in the steep and bent parts of a walk's load, where the reading is high: that is no more."""
+"""A load cell's noise stays in the steep and bent parts of a walk's load, where the reading is high: that is all."""
 
 from __future__ import annotations
 

@@ -103,6 +103,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     answer("prepared", given)
     answer("infer_with_gas_check", found)
+    answer("lags_of_judged", {})
     answer("residual_of", lambda session, model: f"{getattr(session, 'name', session)} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
     answer("repeating_structure", lambda fine, left, thresholds: (fine, left))

@@ -71,7 +71,8 @@ def session_of(load: Array, fitted: Any = None, cycle: Any = None, reading: Any 
     told: Any = SimpleNamespace(metadata={}, sensor=SimpleNamespace(unit=MILLIBAR))
     return Session(
         told, 0, at, load.copy() if reading is None else reading, np.ones(load.size, dtype=bool), ~kept,
-        np.zeros(load.size, dtype=np.intp) if cycle is None else cycle, load < 0.02, 1, DenoisedLoad(load, 0.0, 0.0, np.ones(load.size)),
+        np.zeros(load.size, dtype=np.intp) if cycle is None else cycle, load < 0.02, 1,
+        DenoisedLoad(load, 0.0, 0.0, np.ones(load.size)),
     )  # fmt: skip
 
 

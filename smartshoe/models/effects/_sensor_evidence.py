@@ -132,7 +132,7 @@ def growing_noise(
     """Score, strength and `LocalVariance` where the residual's variance grows with the ``asked`` part; None elsewhere.
 
     ``asked`` is `PRESSURE` or `SLOPE`; growth with the other part is fitted apart, and so is what noise of the load
-    brings where it is left (``load_noise_left``). The test has one false alarm in 1000.
+    brings where ``load_noise_left``. The test has one false alarm in 1000.
     """
     local = local_variance(residual, prediction, sample_time_s, load_noise_left)
     if local is None:
@@ -178,12 +178,12 @@ def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
     """Score statistic (standard normal without the effect) and coefficient of the ``asked`` part of the variance.
 
     The variance is modelled as a constant, a part with the square of pressure (`PRESSURE`), one with that of the slope
-    (`SLOPE`), and one where the load's noise is left (`LOAD`). The other parts are fitted first, so that none stands in for
-    another. The score is of logarithms: few blocks are steep, and their squares are too skewed for a normal law at one
-    in a thousand.
+    (`SLOPE`), and one where the load's noise is left (`LOAD`). The other parts are fitted first, so that none stands in
+    for another. The score is of logarithms: few blocks are steep, and their squares are too skewed for a normal law at
+    one in a thousand.
     """
-    ways = np.ones(local.variance.size), local.pressure_squared, local.slope_squared, local.load_noise
-    columns = np.stack(ways, axis=1)
+    parts = np.ones(local.variance.size), local.pressure_squared, local.slope_squared, local.load_noise
+    columns = np.stack(parts, axis=1)
     columns = columns / np.maximum(columns.max(axis=0), 1e-300)
     other = [0, SLOPE if asked == PRESSURE else PRESSURE, LOAD]
     without = columns @ _variances(columns, local.variance, other)

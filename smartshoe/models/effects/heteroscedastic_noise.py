@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smartshoe.arrays import Array
 from smartshoe.display import percent
 from smartshoe.models.effects._sensor_evidence import (
@@ -28,10 +30,24 @@ class HeteroscedasticNoise(Waveformless, NoiseEffect):
     imitated_by = frozenset({"quantisation"})  # an error on ramps and none on holds, as uneven as the grid's steps
 
     def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
-        """Whether the variance of ``residual`` grows with ``prediction``; growth with its slope is fitted apart."""
-        found = growing_noise(residual, prediction, conditions.step_s, PRESSURE, conditions.load_noise_left)
+        """Whether the variance of ``residual`` grows with ``prediction``; growth with its slope is fitted apart.
+
+        So is noise of the load, where what grows is no louder than that: it is left in the steep and bent parts of the
+        load, where a walk's reading is high.
+        """
+        found = growing_noise(residual, prediction, conditions.step_s, PRESSURE)
+        if found is not None and found[1] <= _brought_by_load(conditions, prediction):
+            found = growing_noise(residual, prediction, conditions.step_s, PRESSURE, conditions.load_noise_left)
         if found is None:
             return None
         value, strength, _ = found
         says = f"the noise grows with the reading: {percent(strength)} of full scale are added where it is largest"
         return SensorEvidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)
+
+
+def _brought_by_load(conditions: Conditions, prediction: Array) -> float:
+    """Standard deviation of the load's own noise in a ``prediction`` (n,), where all of it is left; 0 if not known."""
+    left, span = conditions.load_noise_left, float(np.ptp(conditions.load))
+    if left is None or span == 0.0:
+        return 0.0
+    return conditions.load_noise / float(np.sqrt(left.mean())) * float(np.ptp(prediction)) / span

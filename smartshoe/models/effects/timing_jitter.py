@@ -39,7 +39,7 @@ class TimingJitter(Waveformless, NoiseEffect):
 
         None also where another noise may be why (`_found`).
         """
-        found = _found(residual, prediction, conditions.step_s, conditions.load_noise_left)
+        found = _found(residual, prediction, conditions.step_s)
         if found is None:
             return None
         value, strength, sd_s = found
@@ -49,21 +49,19 @@ class TimingJitter(Waveformless, NoiseEffect):
         return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
 
 
-def jitter_s(residual: Array, prediction: Array, sample_time_s: float, load_noise_left: Array | None = None) -> float:
+def jitter_s(residual: Array, prediction: Array, sample_time_s: float) -> float:
     """Standard deviation of the sampling time in s by the same test; 0 where it finds nothing."""
-    found = _found(residual, prediction, sample_time_s, load_noise_left)
+    found = _found(residual, prediction, sample_time_s)
     return found[2] if found is not None else 0.0
 
 
-def _found(
-    residual: Array, prediction: Array, sample_time_s: float, load_noise_left: Array | None
-) -> tuple[float, float, float] | None:
+def _found(residual: Array, prediction: Array, sample_time_s: float) -> tuple[float, float, float] | None:
     """Score, strength, and the jitter's standard deviation in s; None where something else may be why.
 
     1. A time stamp leaves as much open: a sample may lie anywhere within its interval.
     2. The variance grows with the size itself, and not with its square: beside that the slope explains nothing more.
     """
-    found = growing_noise(residual, prediction, sample_time_s, SLOPE, load_noise_left)
+    found = growing_noise(residual, prediction, sample_time_s, SLOPE)
     if found is None:
         return None
     value, strength, local = found
