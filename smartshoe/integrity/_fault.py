@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -124,7 +124,8 @@ class Integrity:
     def with_judged_lags(self, lags_s: Mapping[int, float]) -> Integrity:
         """The same where recordings that only judge lag by ``lags_s`` more than the fitted ones, by their places."""
         offsets_s, rates, others = [*self.clock_offset_s], [*self.clock_rate], {*self.others}
-        is_moved = any(offset_s or rate for place, offset_s, rate in self._clocks if place not in others | {*lags_s})
+        fitted = {*range(len(rates))} - others - {*lags_s}
+        is_moved = any(offsets_s[place] or rates[place] for place in fitted)
         for place, lag_s in lags_s.items():
             if self.one_clock is not None and place not in others:
                 middle_s = np.array(0.5 * self.recordings[place].duration_s)
@@ -133,8 +134,3 @@ class Integrity:
             if self.one_clock is not None or not is_moved:
                 others.add(place)  # else each is moved to its own load's clock
         return replace(self, clock_offset_s=tuple(offsets_s), clock_rate=tuple(rates), others=frozenset(others))
-
-    @property
-    def _clocks(self) -> Iterator[tuple[int, float, float]]:
-        """Place, lag and rate of each recording."""
-        return zip(range(len(self.clock_rate)), self.clock_offset_s, self.clock_rate, strict=True)

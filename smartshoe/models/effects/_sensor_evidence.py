@@ -202,7 +202,7 @@ def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
 
 
 def _variances(columns: Array, variance: Array, used: list[int]) -> Array:
-    """Coefficients (k,), none below 0, of the ``used`` ``columns`` (m, 3) in ``variance`` (m,): weighted least squares.
+    """Coefficients (k,), none below 0, of the ``used`` ``columns`` (m, k) in ``variance`` (m,): weighted least squares.
 
     The weights are those of squares of noise, whose standard deviation is in proportion to their mean.
     """
