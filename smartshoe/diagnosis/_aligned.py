@@ -56,13 +56,16 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
             offset_s, rate = offset_s - float(clock_of_fitted.lag_s(middle_s)), rate - clock_of_fitted.rate
         elif clock_in_model is not None:
             offset_s = rate = 0.0
+        judged_lag_s = integrity.judged_lags_s.get(place, 0.0)
+        is_beside_fitted = place in integrity.others or (bool(judged_lag_s) and not offset_s)
+        offset_s += judged_lag_s
         if offset_s or rate:
             moved.append(place)
             recording, mask = _on_one_clock(recording, mask, float(offset_s), float(rate))
             does = "lags" if offset_s > 0 else "leads"
             more = f" in the middle, by {abs(rate):.2g} s {'more' if rate * offset_s >= 0 else 'less'} each second"
             by = f"by {abs(offset_s):.3g} s{more if rate else ''}"
-            if place in integrity.others:
+            if is_beside_fitted:
                 said = (
                     f"the reading {does} those of the fitted recordings {by}; it was shifted to their clock before it"
                     " is used as held-out data"

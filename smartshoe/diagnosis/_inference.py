@@ -139,10 +139,8 @@ def infer(
         if not other.is_reduced and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
     found, members = _best_by_single_changes(found, plain, sessions, progress)
-    if found.fit.model.ended:
-        wider = _validated(beyond_bounds(state_at(found.fit, state.banned), progress), plain, sessions)
-        if not wider.is_reduced and error_of(sessions, wider.fit.model) < error_of(sessions, found.fit.model):
-            found, members = _best_by_single_changes(wider, plain, sessions, progress)
+    if (freed := _freed(found, state.banned, plain, sessions, progress)) is not found:
+        found, members = _best_by_single_changes(freed, plain, sessions, progress)
     if found.is_reduced:
         found = found.reduced_to(plain)
         members = found.members()
@@ -290,6 +288,21 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
     cancelling_left = tuple(name for name in cancelling_names if name in kept_names)
     is_reduced = len(extra) < extra_count
     return _Validated(evidence, best, extended, tuple(refused), cancelling_left, is_reduced)
+
+
+def _freed(
+    found: _Validated, banned: tuple[str, ...], plain: Fit, sessions: Sequence[Session], progress: Progress
+) -> _Validated:
+    """``found`` with laws beyond the bounds that they ended at, if that is validated and leaves less; else itself."""
+    if not found.fit.model.ended:
+        return found
+    at_bounds = state_at(found.fit, banned)
+    beyond = beyond_bounds(at_bounds, progress)
+    if beyond is at_bounds:
+        return found
+    wider = _validated(beyond, plain, sessions)
+    leaves_less = error_of(sessions, wider.fit.model) < error_of(sessions, found.fit.model)
+    return wider if leaves_less and not wider.is_reduced else found
 
 
 def _best_by_single_changes(

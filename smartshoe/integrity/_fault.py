@@ -99,6 +99,7 @@ class Integrity:
     agree; ``clock_rate`` is how that lag grows in s per s. ``one_clock`` is the lag that all fitted recordings share,
     where one pair of clocks explains it. ``others`` are the places of recordings that are only judged on and go by
     other clocks. ``are_about_mean``: the offsets are about a lag that the recordings share, which is left to a model.
+    ``judged_lags_s``: how much later, by places, recordings that only judge are than the fitted ones, beside these.
     ``refusals`` says why each recording without a usable sample is useless, in a sentence each, in their order.
     """
 
@@ -111,6 +112,7 @@ class Integrity:
     refusals: tuple[str, ...]
     others: frozenset[int] = frozenset()
     are_about_mean: bool = False
+    judged_lags_s: Mapping[int, float] = field(default_factory=dict)
 
     def with_lags(self, lags_s: Mapping[int, float], are_about_mean: bool, *, were_in_model: bool) -> Integrity:
         """The same with readings that lag by ``lags_s`` more, by the recordings' places, and no clock that all share.
@@ -123,14 +125,5 @@ class Integrity:
 
     def with_judged_lags(self, lags_s: Mapping[int, float]) -> Integrity:
         """The same where recordings that only judge lag by ``lags_s`` more than the fitted ones, by their places."""
-        offsets_s, rates, others = [*self.clock_offset_s], [*self.clock_rate], {*self.others}
-        fitted = {*range(len(rates))} - others - {*lags_s}
-        is_moved = any(offsets_s[place] or rates[place] for place in fitted)
-        for place, lag_s in lags_s.items():
-            if self.one_clock is not None and place not in others:
-                middle_s = np.array(0.5 * self.recordings[place].duration_s)
-                offsets_s[place], rates[place] = float(self.one_clock.lag_s(middle_s)), self.one_clock.rate
-            offsets_s[place] += lag_s
-            if self.one_clock is not None or not is_moved:
-                others.add(place)  # else each is moved to its own load's clock
-        return replace(self, clock_offset_s=tuple(offsets_s), clock_rate=tuple(rates), others=frozenset(others))
+        more_s = {place: self.judged_lags_s.get(place, 0.0) + lag_s for place, lag_s in lags_s.items()}
+        return replace(self, judged_lags_s={**self.judged_lags_s, **more_s})

@@ -9,6 +9,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from simulators.hidden.recordings import HiddenCase, hide
+from smartshoe.arrays import Array
 from smartshoe.diagnosis import diagnose
 from smartshoe.integrity import examine
 from smartshoe.recording import Recording
@@ -19,11 +20,16 @@ def _sound() -> HiddenCase:
     return hide({}, protocol="mixed", seed=40, recordings=2)
 
 
+def _late_by(recording: Recording, lag_s: float | Array) -> Recording:
+    """The reading of a logger whose clock is behind by so much."""
+    time_s, sensor = recording.time_s, recording.sensor
+    shown_s = np.clip(time_s - lag_s, time_s[0], time_s[-1])
+    return recording.with_channel(sensor.with_values(CubicSpline(time_s, sensor.values)(shown_s)))
+
+
 def _parting(recording: Recording, rate: float) -> Recording:
     """The reading of a logger whose clock falls behind by ``rate`` s a second."""
-    time_s, sensor = recording.time_s, recording.sensor
-    shown_s = np.clip(time_s - rate * (time_s - time_s[0]), time_s[0], time_s[-1])
-    return recording.with_channel(sensor.with_values(CubicSpline(time_s, sensor.values)(shown_s)))
+    return _late_by(recording, rate * (recording.time_s - recording.time_s[0]))
 
 
 @pytest.mark.parametrize("rate", [0.003, -0.0005])
@@ -87,10 +93,3 @@ def test_a_recording_that_is_late_by_some_milliseconds_more_is_judged_on_the_clo
     said = [said for said in found.limits if "the reading lags those of the fitted recordings by" in said]
     assert len(said) == len(late)
     assert not any("was shifted" in said for said in plain.limits)
-
-
-def _late_by(recording: Recording, lag_s: float) -> Recording:
-    """The reading of a logger that was started so much later."""
-    time_s, sensor = recording.time_s, recording.sensor
-    shown_s = np.clip(time_s - lag_s, time_s[0], time_s[-1])
-    return recording.with_channel(sensor.with_values(CubicSpline(time_s, sensor.values)(shown_s)))

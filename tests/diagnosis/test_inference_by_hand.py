@@ -329,7 +329,7 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     assert flow.infer().best_single is None
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
-        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",), ended=())),
+        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))),
         cancelling_names=(), members=lambda: ("curve",), together=lambda members: "a curve alone",
     )  # fmt: skip
     flow.best_single = "a curve", judged

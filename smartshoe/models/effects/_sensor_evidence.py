@@ -118,11 +118,8 @@ def local_variance(
     def means(values: Array) -> Array:
         return np.asarray(values[smooth][:whole].reshape(-1, TRIPLETS).mean(axis=1))
 
-    noise = (
-        np.zeros(fast.size)
-        if load_noise_left is None
-        else load_noise_left[:n].reshape(-1, 3) @ np.array([1.0, 4.0, 1.0]) / 6.0
-    )
+    left = np.zeros(n) if load_noise_left is None else load_noise_left[:n]
+    noise = left.reshape(-1, 3) @ np.array([1.0, 4.0, 1.0]) / 6.0  # of a second difference: the squares of its weights
     return LocalVariance(means(fast**2), means(prediction[1:n:3] ** 2), means(slope**2), means(noise))
 
 
@@ -132,7 +129,7 @@ def growing_noise(
     """Score, strength and `LocalVariance` where the residual's variance grows with the ``asked`` part; None elsewhere.
 
     ``asked`` is `PRESSURE` or `SLOPE`; growth with the other part is fitted apart, and so is what noise of the load
-    brings where ``load_noise_left``. The test has one false alarm in 1000.
+    brings (``load_noise_left``, see `local_variance`). The test has one false alarm in 1000.
     """
     local = local_variance(residual, prediction, sample_time_s, load_noise_left)
     if local is None:

@@ -300,19 +300,13 @@ class Effect(ABC):
             p.widened if not p.widened.is_stretched(v) and p.is_stretched(v) else p
             for p, v in zip(self.parameters, map(float, values), strict=True)
         )
-        if wider == self.parameters:
-            return self
-        variant = copy(self)
-        vars(variant).update(parameters=wider)
-        return variant
+        return self if wider == self.parameters else _variant(self, parameters=wider)
 
     def of_at_most(self, value: float) -> Effect:
         """The effect, of one parameter, with bounds at null and at ``value``."""
         (strength,) = self.parameters
         null = strength.null or 0.0
-        variant = copy(self)
-        vars(variant).update(parameters=(replace(strength, lower=min(null, value), upper=max(null, value)),))
-        return variant
+        return _variant(self, parameters=(replace(strength, lower=min(null, value), upper=max(null, value)),))
 
     def departs_by(self, values: Array) -> float:
         """By what share of itself the effect differs from a law, of a block that follows what no law does."""
@@ -375,8 +369,13 @@ def _of_either_sign(effect: Effect, says: str, of_strength: str) -> Effect:
         one if one.null is None else replace(one, says=of_strength, lower=2.0 * one.null - one.upper)
         for one in effect.parameters
     )
+    return _variant(effect, says=says, parameters=tuple(strengths))
+
+
+def _variant(effect: Effect, **traits: object) -> Effect:
+    """``effect`` with other ``traits``."""
     variant = copy(effect)
-    vars(variant).update(says=says, parameters=tuple(strengths))
+    vars(variant).update(traits)
     return variant
 
 
