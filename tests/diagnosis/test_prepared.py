@@ -35,6 +35,7 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
             usable=usable,
             others=frozenset(),
             are_about_mean=False,
+            judged_lags_s={},
         )
 
     def with_lag(lag_s: float) -> Any:

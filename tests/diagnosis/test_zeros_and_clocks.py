@@ -385,6 +385,7 @@ def _told(
         usable=usable,
         others=frozenset(),
         are_about_mean=False,
+        judged_lags_s={},
     )
     return aligned(runs, integrity)
 
@@ -420,6 +421,7 @@ def test_readings_moved_about_a_shared_delay_say_so() -> None:
     integrity: Any = SimpleNamespace(
         clock_offset_s=(0.6, 0.0), clock_rate=(0.0, 0.0), one_clock=None, usable=usable, others=frozenset(),
         are_about_mean=True,
+        judged_lags_s={},
     )  # fmt: skip
     (said,) = aligned(runs, integrity).says
     assert "the reading lags those of the other recordings by 0.6 s" in said
@@ -444,6 +446,7 @@ def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
         usable=tuple(masks),
         others=frozenset(),
         are_about_mean=False,
+        judged_lags_s={},
     )
     lost = np.flatnonzero(~aligned(runs, integrity).usable[0][:1400])
     assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
