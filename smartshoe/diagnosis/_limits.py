@@ -74,11 +74,7 @@ def reason_of_another_kind(name: Name, model: ExtendedModel, thresholds: Thresho
     A flexible block of a behaviour without a law is one where it departs from every law by more than laws do.
     """
     part = model.part(name.member.name)
-    if (
-        part.effect.why_unnamed
-        and name.law_in_place is None
-        and part.effect.departs_by(part.values) > thresholds.law_departure
-    ):
+    if part.effect.why_unnamed and part.effect.departs_by(part.values) > thresholds.law_departure:
         return f"the reading {part.effect.why_unnamed}: no effect of the catalogue does this, so that it is not named"
     if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]

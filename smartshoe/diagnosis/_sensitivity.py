@@ -228,10 +228,16 @@ class Linearised:
         return tuple(_factors(session, self.thresholds) for session in self.sessions)
 
     def noise_sd(self) -> float:
-        """Standard deviation of what no column explains, noise or structure, counted once per correlation time."""
-        whole = self.gram
-        part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
-        found = np.linalg.solve(part, whole[1:, 0])
+        """Standard deviation of what no column explains, noise or structure, counted once per correlation time.
+
+        Columns of a catch-all count only if the model has it.
+        """
+        counted = [one for one in self.candidates if not one.effect.is_catch_all or one.name in self.model.names]
+        kept = np.array([*range(1, 1 + self.baseline_count), *(k for one in counted for k in one.columns)])
+        part = self.gram[np.ix_(kept, kept)]
+        part.flat[:: kept.size + 1] += 1e-9 * np.trace(part) / (1 + kept.size)
+        found = np.zeros(self.gram.shape[0] - 1)
+        found[kept - 1] = np.linalg.solve(part, self.gram[kept, 0])
         left = []
         for session, rows, columns in zip(self.sessions, self.rows, self.nuisances, strict=True):
             residual = rows[:, 0] - rows[:, 1:] @ found

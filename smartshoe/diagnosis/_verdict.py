@@ -148,7 +148,7 @@ def sentence_of(
     if verdict == "adequate":
         return f"{good}{left and f'{left}, no more than small imperfections of a good unit add up to'}"
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:
-        return f"{good}{left}: the extended model is good to {by_all}, with effects of which none is sure"
+        return f"{good}{left}: the extended model is good to {by_all}, with effects that have no name"
     if verdict == "unexplained":
         why = "no cause can be named from this data (see its limits)" if withheld else None
         return f"{good}{left}, and {why or 'no effect of the catalogue accounts for it'}"

@@ -29,6 +29,7 @@ from smartshoe.diagnosis._sensitivity import (
 )
 from smartshoe.models.effects import Conditions, effect, is_told_from_its_family
 from smartshoe.models.effects.exposure import WORDS
+from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
@@ -118,7 +119,7 @@ def test_what_only_later_load_cycles_show_is_not_looked_for_where_no_recording_h
 
     memories = {
         "mullins_softening", "cycle_conditioning", "gain_drift", "flexible_softening", "flexible_gain_drift",
-        "flexible_lag",
+        "flexible_lag", "flexible_thixotropy",
     }  # fmt: skip
     assert told(twice) - told(once, once) == memories
     assert told(once, twice) == told(twice)
@@ -209,6 +210,25 @@ def test_what_no_column_reaches_is_the_noise() -> None:
     assert given.noise_sd() == pytest.approx(expected, rel=1e-6)
     parts = [marginal(r, one, MODEL.pole_per_s) for r, one in zip(rows, sessions, strict=True)]
     assert given.gram[0, 0] == pytest.approx(sum(part[0, 0] for part in parts))
+
+
+def test_a_catch_all_lowers_the_noise_only_where_the_model_has_it() -> None:
+    """It follows a part of what is left in most data, and the other effects would be held to the less noise."""
+    block = effect("flexible_thixotropy")
+    inside = MODEL.with_part(block, block.begun())
+    sessions = sessions_under(MODEL, noise=0.05)
+    catching = tuple(np.column_stack([one.reading, one.conditions.load, one.reading]) for one in sessions)
+    taken = [row[:, :2] for row in catching]
+
+    def noise(model: ExtendedModel, rows: Any, *candidates: Candidate) -> float:
+        return Linearised(
+            model, tuple(sessions), tuple(rows), np.ones(rows[0].shape[1]), 1, candidates, STANDARD
+        ).noise_sd()
+
+    one = Candidate(block, {}, (2,), False)
+    assert noise(MODEL, catching, one) == pytest.approx(noise(MODEL, taken), rel=1e-9)
+    assert noise(inside, catching, one) < 1e-3 * noise(MODEL, taken)
+    assert noise(MODEL, catching, replace(one, effect=effect("rate_gain"))) < 1e-3 * noise(MODEL, taken)
 
 
 @pytest.mark.parametrize(("share", "begun"), [(0.2, 0.5), (0.2, 0.01), (-0.2, -0.5), (0.0, 1.0)])

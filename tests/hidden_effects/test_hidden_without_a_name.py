@@ -1,4 +1,4 @@
-"""What no law of the catalogue does: a port that opens one way, a zero that jumps. Told, and no law named for it."""
+"""What no law of the catalogue does: a port that opens one way, a gain that recovers, a zero that jumps: told."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bank import PLAIN, within_reach
 from daily import first_and_bank
+from scipy.ndimage import gaussian_filter1d
 
 from smartshoe.diagnosis import Diagnosis, diagnose
 from smartshoe.recording import Recording
@@ -35,6 +36,26 @@ def _jumped(recording: Recording, jumps: tuple[tuple[float, float], ...]) -> Rec
     share = (recording.time_s - recording.time_s[0]) / np.ptp(recording.time_s)
     moved = np.sum([by * (share >= at) for at, by in jumps], axis=0) * np.ptp(reading.values)
     return recording.with_channel(replace(reading, values=reading.values + moved))
+
+
+def _worked(recording: Recording, lost: float, heals_s: float) -> Recording:
+    """The reading of a gel with two kinds of bonds that work breaks, each by a power of its rate, and rest mends.
+
+    ``lost``: share of the gain that goes with all bonds. The second kind mends four times as slowly; what does not mend
+    (``heals_s`` infinite) breaks in as many loadings.
+    """
+    reading, span = recording.sensors[0], float(np.ptp(recording.sensors[0].values))
+    height = (reading.values - reading.values[0]) / span
+    smooth = gaussian_filter1d(height, 15)  # noise does no work
+    step_s = np.diff(recording.time_s, prepend=recording.time_s[0])
+    power = np.abs(np.diff(smooth**2, prepend=smooth[0] ** 2)) / np.maximum(step_s, 1e-9)  # of a spring, by the second
+    gone = np.zeros(height.size)
+    for share, exponent, slower in ((0.6, 0.8, 1.0), (0.4, 1.2, 4.0)):
+        broken = 0.0
+        for k in range(1, height.size):
+            broken += step_s[k] * (0.08 * power[k] ** exponent * (1.0 - broken) - broken / (slower * heals_s))
+            gone[k] += share * broken
+    return recording.with_channel(replace(reading, values=reading.values[0] + span * height * (1.0 - lost * gone)))
 
 
 def _sure(found: Diagnosis) -> set[str]:
@@ -68,6 +89,31 @@ def test_a_port_that_is_as_slow_both_ways_is_a_lag(seed: int, tau_s: float) -> N
     found = diagnose(fitted, held_out)
     assert "timing" in _sure(found)
     assert "one way" not in " ".join(found.limits)
+
+
+@pytest.mark.parametrize("heals_s", first_and_bank([8.0, 20.0], {8.0}))
+@pytest.mark.parametrize("protocol", first_and_bank([*PLAIN], {"rates_and_holds"}))
+@pytest.mark.parametrize("seed", first_and_bank([60, 61], {60}))
+def test_a_gain_that_comes_back_at_rest_is_told_and_no_softening_is_named_for_it(
+    seed: int, protocol: str, heals_s: float
+) -> None:
+    case = within_reach({}, protocol, seed, recordings=2)
+    fitted, held_out = ([_worked(one, 0.15, heals_s) for one in some] for some in (case.recordings, case.hold_out))
+    found = diagnose(fitted, held_out)
+    assert "gets it back at rest" in " ".join(found.limits)
+    assert not any(one.confidence > 0.5 for one in found.causes)
+    assert found.gain is not None
+    assert found.gain.gain_percent > 5.0  # half of what is left is noise
+
+
+@pytest.mark.parametrize("protocol", first_and_bank([*PLAIN], {"rates_and_holds"}))
+@pytest.mark.parametrize("seed", first_and_bank([62, 63], {62}))
+def test_a_gain_that_stays_gone_at_rest_is_a_softening(seed: int, protocol: str) -> None:
+    case = within_reach({}, protocol, seed, recordings=2)
+    fitted, held_out = ([_worked(one, 0.06, np.inf) for one in some] for some in (case.recordings, case.hold_out))
+    found = diagnose(fitted, held_out)
+    assert {"softening", "gain_drift"} & {one.effect.family for one in found.causes if one.confidence > 0.5}
+    assert "gets it back at rest" not in " ".join(found.limits)
 
 
 @pytest.mark.parametrize("effects", first_and_bank([{}, {"wall_hardening": 1.0}], [{}]))

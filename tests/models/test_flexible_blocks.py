@@ -49,7 +49,7 @@ def test_blocks_stand_apart_from_the_effects_that_may_be_named() -> None:
     assert set(NAMES) == {
         "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop", "flexible_set",
         "flexible_asymmetry", "flexible_heat", "flexible_softening", "flexible_gain_drift",
-        "flexible_lag",
+        "flexible_lag", "flexible_thixotropy",
     }  # fmt: skip
     assert not set(NAMES) & set(catalogue())
     assert not any(one.is_flexible for one in catalogue().values())

@@ -196,7 +196,7 @@ def how_much(diagnosis: Diagnosis) -> str | None:
         f" ({plain(share_of_full_scale(diagnosis, before.rmse), 2)} % of full scale, rms)"
     )
     if after.rmse < 0.98 * before.rmse:
-        what = "what was found" if diagnosis.causes else "effects too small or too unsure for a name"
+        what = "what was found" if diagnosis.causes else "effects that have no name"
         said += (
             f"; with {what} it is off by {with_unit(plain(after.rmse), after.unit)}"
             f" ({plain(share_of_full_scale(diagnosis, after.rmse), 2)} %)"
