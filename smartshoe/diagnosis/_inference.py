@@ -34,7 +34,7 @@ from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import effective_noise_sd
 from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import BREADTH, best_additions
-from smartshoe.diagnosis._sensitivity import NON_PRESSURES, is_remembered_by_gas
+from smartshoe.diagnosis._sensitivity import NON_PRESSURES, Linearised, is_remembered_by_gas, linearised
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import Progress, beyond_bounds, law_or_block, settled, simpler, simpler_from
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, state_at
@@ -110,7 +110,8 @@ def infer(
     """
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
-    evidence, best = linearised_search(plain.model, sessions, thresholds)
+    sessions, about = _where_a_catch_all_leads(plain, sessions, thresholds)
+    evidence, best = linearised_search(plain.model, sessions, thresholds, linearisation=about)
     screening, likeness = _screening(evidence)
     is_valid = can_validate(sessions, thresholds)
     if not (is_unit and is_valid):
@@ -166,6 +167,24 @@ def infer(
         nearest_law=nearest_law,
         together=found.together(members),
     )
+
+
+def _where_a_catch_all_leads(
+    plain: Fit, sessions: Sequence[Session], thresholds: Thresholds
+) -> tuple[Sequence[Session], Linearised]:
+    """The ``sessions``, and the linearisation about the plain fit; without catch-alls unless one does most by itself.
+
+    Beside others such a block takes a part of what no equation follows, and changes which of them are found.
+    """
+    about = linearised(plain.model, sessions, thresholds)
+    candidates = about.candidates
+    inside = tuple(k for k, one in enumerate(candidates) if one.name in plain.model.names)
+    first = best_additions(Evidence(about, about.noise_sd()), inside, 1)
+    last = {one.name for one in candidates if one.effect.is_catch_all}
+    if not last or any(candidates[k].name in last for k in first):
+        return sessions, about
+    usual = [replace(one, without_catch_alls=True) for one in sessions]
+    return usual, about.without(last, fitted_of(usual))
 
 
 def _with_own_terms(

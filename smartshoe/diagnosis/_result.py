@@ -287,7 +287,9 @@ class Diagnosis(Summarised):
         if not self.minor:
             return None
         which = "extended" if self.rejected is None else "rejected"
-        return f"in the {which} model without being causes, too small, too unsure or of no known law: {self.minor_in_words}"
+        return (
+            f"in the {which} model without being causes, too small, too unsure or without a law: {self.minor_in_words}"
+        )
 
     def calibration(self, *, unit: str = "", sample_rate_hz: float | None = None, created: str = "") -> Calibration:
         """The extended model as a calibration, for `compensate`, `export` and a twin.

@@ -9,8 +9,8 @@ by it, a gain. They are marginalised exactly (flat and Gaussian priors), so that
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -98,6 +98,8 @@ def available_effects(sessions: Sequence[Session], thresholds: Thresholds) -> li
     found += [one.tare for one in sessions[:1] if one.tare is not None]
     if any(one.without_gas_memory for one in sessions):
         found = [e for e in found if not is_remembered_by_gas(e)]
+    if any(one.without_catch_alls for one in sessions):
+        found = [e for e in found if not e.is_catch_all]
     if not any(one.recording.sensor.unit.quantity == "pressure" for one in sessions):
         found = [e.of_any_sensor() for e in found]
     return [e for e in found if e.needs <= has and not e.is_refinement and (has_cycles or not e.needs_cycles)]
@@ -227,17 +229,22 @@ class Linearised:
         """(n, 6) for each session: smooth functions of load, direction, rate and time on which a size may depend."""
         return tuple(_factors(session, self.thresholds) for session in self.sessions)
 
-    def noise_sd(self) -> float:
-        """Standard deviation of what no column explains, noise or structure, counted once per correlation time.
+    def without(self, names: Collection[str], sessions: Sequence[Session]) -> Linearised:
+        """The same of ``sessions`` in which the candidates ``names`` are not sought."""
+        candidates = [one for one in self.candidates if one.name not in names]
+        kept = [*range(1 + self.baseline_count), *(k for one in candidates for k in one.columns)]
+        place = {old: new for new, old in enumerate(kept)}
+        candidates = [replace(one, columns=tuple(place[k] for k in one.columns)) for one in candidates]
+        rows = tuple(np.asfortranarray(columns[:, kept]) for columns in self.rows)
+        return replace(
+            self, sessions=tuple(sessions), rows=rows, scales=self.scales[kept], candidates=tuple(candidates)
+        )
 
-        Columns of a catch-all count only if the model has it.
-        """
-        counted = [one for one in self.candidates if not one.effect.is_catch_all or one.name in self.model.names]
-        kept = np.array([*range(1, 1 + self.baseline_count), *(k for one in counted for k in one.columns)])
-        part = self.gram[np.ix_(kept, kept)]
-        part.flat[:: kept.size + 1] += 1e-9 * np.trace(part) / (1 + kept.size)
-        found = np.zeros(self.gram.shape[0] - 1)
-        found[kept - 1] = np.linalg.solve(part, self.gram[kept, 0])
+    def noise_sd(self) -> float:
+        """Standard deviation of what no column explains, noise or structure, counted once per correlation time."""
+        whole = self.gram
+        part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
+        found = np.linalg.solve(part, whole[1:, 0])
         left = []
         for session, rows, columns in zip(self.sessions, self.rows, self.nuisances, strict=True):
             residual = rows[:, 0] - rows[:, 1:] @ found

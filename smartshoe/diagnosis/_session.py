@@ -57,7 +57,8 @@ class Session:
     ``zero_sd``. ``gap_ends`` are the first samples after gaps with an unknown load that are long enough for the wall to
     creep. ``unknown_past``: the load that a unit at rest may still remember. ``white_sd`` is the standard deviation of
     the reading's white noise at the full rate. ``without_gas_memory``: effects by which a gas remembers are not sought.
-    ``tare``: the load cell's, of at most what rests show; None where they show none.
+    ``without_catch_alls``: nor are blocks that follow a part of what is left in most data. ``tare``: the load cell's,
+    of at most what rests show; None where they show none.
     """
 
     recording: Recording
@@ -78,6 +79,7 @@ class Session:
     unknown_past: float = 1.0
     white_sd: float = 0.0
     without_gas_memory: bool = False
+    without_catch_alls: bool = False
     tare: Effect | None = None
 
     @property

@@ -29,7 +29,6 @@ from smartshoe.diagnosis._sensitivity import (
 )
 from smartshoe.models.effects import Conditions, effect, is_told_from_its_family
 from smartshoe.models.effects.exposure import WORDS
-from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
@@ -212,23 +211,19 @@ def test_what_no_column_reaches_is_the_noise() -> None:
     assert given.gram[0, 0] == pytest.approx(sum(part[0, 0] for part in parts))
 
 
-def test_a_catch_all_lowers_the_noise_only_where_the_model_has_it() -> None:
-    """It follows a part of what is left in most data, and the other effects would be held to the less noise."""
-    block = effect("flexible_thixotropy")
-    inside = MODEL.with_part(block, block.begun())
+def test_without_some_candidates_the_columns_of_all_others_stay_as_they_are() -> None:
     sessions = sessions_under(MODEL, noise=0.05)
-    catching = tuple(np.column_stack([one.reading, one.conditions.load, one.reading]) for one in sessions)
-    taken = [row[:, :2] for row in catching]
-
-    def noise(model: ExtendedModel, rows: Any, *candidates: Candidate) -> float:
-        return Linearised(
-            model, tuple(sessions), tuple(rows), np.ones(rows[0].shape[1]), 1, candidates, STANDARD
-        ).noise_sd()
-
-    one = Candidate(block, {}, (2,), False)
-    assert noise(MODEL, catching, one) == pytest.approx(noise(MODEL, taken), rel=1e-9)
-    assert noise(inside, catching, one) < 1e-3 * noise(MODEL, taken)
-    assert noise(MODEL, catching, replace(one, effect=effect("rate_gain"))) < 1e-3 * noise(MODEL, taken)
+    whole = linearised(MODEL, sessions, STANDARD)
+    usual = [replace(one, without_catch_alls=True) for one in sessions]
+    less, anew = whole.without({"flexible_thixotropy"}, usual), linearised(MODEL, usual, STANDARD)
+    assert [(one.name, one.shape, one.columns) for one in less.candidates] == [
+        (one.name, one.shape, one.columns) for one in anew.candidates
+    ]
+    for one, other in zip(less.rows, anew.rows, strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(less.scales, anew.scales)
+    assert less.noise_sd() == anew.noise_sd()
+    assert {one.name for one in whole.candidates} - {one.name for one in less.candidates} <= {"flexible_thixotropy"}
 
 
 @pytest.mark.parametrize(("share", "begun"), [(0.2, 0.5), (0.2, 0.01), (-0.2, -0.5), (0.0, 1.0)])

@@ -19,6 +19,7 @@ from smartshoe.diagnosis._inference import (
     _screening,
     _Validated,
     _validated,
+    _where_a_catch_all_leads,
     _without_redundant,
     independent_count,
     infer,
@@ -48,6 +49,42 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
     found, alike = _screening(evidence)
     assert found == tuple((f"n{k}", float(k)) for k in range(11, 1, -1))
     assert alike == list(range(11, 1, -1))  # in the same order
+
+
+def test_what_catches_all_is_sought_only_where_it_does_more_than_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    block, law, delay = (
+        SimpleNamespace(name=name, effect=effect(name)) for name in ("flexible_thixotropy", "rate_gain", "delay")
+    )
+    dropped: list[Any] = []
+
+    def about(*candidates: Any) -> Any:
+        def without(names: Any, sessions: Any) -> str:
+            dropped.append(({*names}, [one.without_catch_alls for one in sessions]))
+            return "without"
+
+        return SimpleNamespace(candidates=candidates, noise_sd=lambda: 0.1, without=without)
+
+    def asked(evidence: Any, members: Any, breadth: int) -> list[int]:
+        assert (members, breadth) == ((0,), 1)  # beside the delay, which is in the plain model
+        return leading
+
+    monkeypatch.setattr(_inference, "Evidence", lambda given, noise_sd: "evidence")
+    monkeypatch.setattr(_inference, "best_additions", asked)
+    plain: Any = SimpleNamespace(model=MODEL.with_part("delay", np.array([0.01])))
+    sessions = [session_of(WAVE)]
+    leading: list[int] = []
+    for candidates, best, is_sought in (
+        ((delay, law, block), 2, True),
+        ((delay, law, block), 1, False),
+        ((delay, law), 1, True),
+    ):
+        leading[:] = [best]
+        given = about(*candidates)
+        monkeypatch.setattr(_inference, "linearised", lambda *of, given=given: given)
+        found, linearisation = _where_a_catch_all_leads(plain, sessions, STANDARD)
+        assert (found is sessions, linearisation is given) == (is_sought, is_sought)
+        assert not any(one.without_catch_alls for one in sessions)
+    assert dropped == [({"flexible_thixotropy"}, [True])]
 
 
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
@@ -112,9 +149,9 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
-    monkeypatch.setattr(
-        _inference, "linearised_search", lambda *given: (SimpleNamespace(noise_sd=0.1), SimpleNamespace())
-    )
+    monkeypatch.setattr(_inference, "_where_a_catch_all_leads", lambda plain, sessions, thresholds: (sessions, "about"))
+    evidence = SimpleNamespace(noise_sd=0.1)
+    monkeypatch.setattr(_inference, "linearised_search", lambda *given, linearisation: (evidence, SimpleNamespace()))
     monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
     monkeypatch.setattr(_inference, "independent_count", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)

@@ -143,7 +143,7 @@ def test_a_summary_tells_what_the_command_tells_beside_the_causes() -> None:
     told = replace(FOUND, data_faults=(hum,), leftover="a third lies in holds", next_experiment=repeat).summary()
     for line in (
         "fault of the data: held samples, run_1.csv: three samples in ten are held",
-        "in the extended model without being causes, too small, too unsure or of no known law: hum",
+        "in the extended model without being causes, too small, too unsure or without a law: hum",
         "what is left: a third lies in holds",
         *(f"limit: {limit}" for limit in FOUND.limits),
         "next: repeat the load cycle",

@@ -32,7 +32,7 @@ def session_under(load: Array, reading: Array, seed: int = 0, lost: float = 0.2,
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
         cycle=np.arange(load.size) * 7 // load.size, recording=told, unknown_past=0.05,
-        without_gas_memory=False, tare=None,
+        without_gas_memory=False, without_catch_alls=False, tare=None,
         own_gain_sd=0.0, gain_parts=(), zero_changes=(), zero_sd=0.0, gap_ends=(), thinned=1, resting=load <= 0.0,
     )  # fmt: skip
 

@@ -229,7 +229,7 @@ def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be()
     assert (
         "No other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88. Family:" in text
     )
-    assert "In the extended model without being causes, too small, too unsure or of no known law: sensor lag." in text
+    assert "In the extended model without being causes, too small, too unsure or without a law: sensor lag." in text
     for heading in ("cannot be ruled out", "came near, and is less likely"):
         assert f"{heading} in the place of this one what it would be what tells the two apart" in text
     assert "bouc wen hysteresis fits worse by 1.7 " in text

@@ -40,7 +40,7 @@ def test_the_terminal_says_the_size_first_then_the_verdict_and_everything_after(
     if made.next_experiment:
         assert RUN_NEXT in said
     if made.minor:
-        assert "in the extended model without being causes, too small, too unsure or of no known law: sensor lag" in said
+        assert "in the extended model without being causes, too small, too unsure or without a law: sensor lag" in said
 
 
 def test_limits_come_before_recordings_that_were_left_out_and_none_is_cut_off(

@@ -216,8 +216,8 @@ class Effect(ABC):
     ``is_flexible``: True for a block that follows any member of its family; it is never named as a cause.
     ``is_refinement``: True where such a block follows members of other families too, so that it tells no kind.
     ``why_unnamed``: of a block that follows what no law of the catalogue does, what the reading then does.
-    ``is_catch_all``: True of such a block that follows a part of what is left in most data, whatever it is of: noise is
-    told without it.
+    ``is_catch_all``: True of such a block that follows a part of what is left in most data, whatever that is of; it is
+    sought only where it does more by itself than any other effect.
     ``is_steep_undone``: True where half a spacing of single precision in a signal moves the load by 3e-7 of full scale.
     ``is_memoryless``: True where the reading is a function of the present load alone.
     ``bends_beside_arm``: True where it needs ``conditions.relaxing``, which a model gives to such effects only.
