@@ -79,6 +79,9 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
         prior = np.full(rows.shape[1] - 1, limits.imperfection)
         prior[: given.baseline_count] = 1.0
+        for one in given.candidates:
+            if one.effect.why_unnamed:  # no good unit has a little of it
+                prior[[c - 1 for c in one.columns]] = 0.0
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
         kept = session.fitted
