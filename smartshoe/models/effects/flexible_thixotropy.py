@@ -37,8 +37,8 @@ class FlexibleThixotropy(Remembering):
                         0.01),
         EffectParameter("per_loading", "1", "w: how much of it a loading to full scale and back breaks", None, 0.1,
                         5.0, 1.0),
-        EffectParameter("recovery_time", "s", "T: time in which rest builds 63 % of it up again", None, 2.0, 100.0,
-                        10.0),
+        EffectParameter("recovery_time", "s", "T: time in which rest builds 63 % of it up again", None, 5.0, 100.0,
+                        10.0, kind_ends="lower"),
     )  # fmt: skip
     shapes = tuple({"per_loading": 1.0, "recovery_time": tau} for tau in (5.0, 20.0))
     exposed_by = by("repeats", "pauses")
