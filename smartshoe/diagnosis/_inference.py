@@ -37,7 +37,7 @@ from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, Linearised, is_remembered_by_gas, linearised
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._settling import Progress, beyond_bounds, law_or_block, settled, simpler, simpler_from
-from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, state_at
+from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, set_of, state_at
 from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import listed
@@ -177,14 +177,14 @@ def _where_a_catch_all_leads(
     Beside others such a block takes a part of what no equation follows, and changes which of them are found.
     """
     about = linearised(plain.model, sessions, thresholds)
-    candidates = about.candidates
-    inside = tuple(k for k, one in enumerate(candidates) if one.name in plain.model.names)
-    first = best_additions(Evidence(about, about.noise_sd()), inside, 1)
-    last = {one.name for one in candidates if one.effect.is_catch_all}
-    if not last or any(candidates[k].name in last for k in first):
+    catch_alls = {one.name for one in about.candidates if one.effect.is_catch_all}
+    if not catch_alls:
+        return sessions, about
+    first = best_additions(Evidence(about, about.noise_sd()), set_of(plain.model, about), 1)
+    if any(about.candidates[k].name in catch_alls for k in first):
         return sessions, about
     usual = [replace(one, without_catch_alls=True) for one in sessions]
-    return usual, about.without(last, fitted_of(usual))
+    return usual, about.without(catch_alls, fitted_of(usual))
 
 
 def _with_own_terms(

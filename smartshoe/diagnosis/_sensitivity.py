@@ -231,14 +231,12 @@ class Linearised:
 
     def without(self, names: Collection[str], sessions: Sequence[Session]) -> Linearised:
         """The same of ``sessions`` in which the candidates ``names`` are not sought."""
-        candidates = [one for one in self.candidates if one.name not in names]
-        kept = [*range(1 + self.baseline_count), *(k for one in candidates for k in one.columns)]
+        left = [one for one in self.candidates if one.name not in names]
+        kept = [*range(1 + self.baseline_count), *(k for one in left for k in one.columns)]
         place = {old: new for new, old in enumerate(kept)}
-        candidates = [replace(one, columns=tuple(place[k] for k in one.columns)) for one in candidates]
+        candidates = tuple(replace(one, columns=tuple(place[k] for k in one.columns)) for one in left)
         rows = tuple(np.asfortranarray(columns[:, kept]) for columns in self.rows)
-        return replace(
-            self, sessions=tuple(sessions), rows=rows, scales=self.scales[kept], candidates=tuple(candidates)
-        )
+        return replace(self, sessions=tuple(sessions), rows=rows, scales=self.scales[kept], candidates=candidates)
 
     def noise_sd(self) -> float:
         """Standard deviation of what no column explains, noise or structure, counted once per correlation time."""

@@ -60,7 +60,7 @@ class State:
     @property
     def fitted_members(self) -> Members:
         """The candidates that are in the fitted model."""
-        return _set_of(self.fit.model, self.linearisation)
+        return set_of(self.fit.model, self.linearisation)
 
     @property
     def exceeds_linear_range(self) -> bool:
@@ -96,7 +96,7 @@ def linearised_search(
     """
     linearisation = linearised(model, sessions, thresholds) if linearisation is None else linearisation
     evidence = Evidence(linearisation, linearisation.noise_sd())
-    start = _set_of(model, linearisation)
+    start = set_of(model, linearisation)
     first = best_step(evidence, start, banned)
     if _exceeds_linear_range(first, start, thresholds):
         return evidence, first
@@ -112,10 +112,10 @@ def evidence_about(
     which count only as small imperfections.
     """
     evidence = Evidence(linearised(model, other.linearisation.sessions, other.thresholds, nearby), other.noise_sd)
-    return evidence, evidence.posterior(_set_of(model, evidence.linearisation))
+    return evidence, evidence.posterior(set_of(model, evidence.linearisation))
 
 
-def _set_of(model: ExtendedModel, linearisation: Linearised) -> Members:
+def set_of(model: ExtendedModel, linearisation: Linearised) -> Members:
     """The candidates that are in ``model``."""
     return tuple(k for k, one in enumerate(linearisation.candidates) if one.name in model.names)
 

@@ -47,7 +47,7 @@ def test_it_follows_its_differential_equation(
     corners = np.repeat([0.0, *knots], 2)  # each level is held for a while
     load = np.interp(np.arange(20 * corners.size) / 20.0, np.arange(corners.size), corners)
     # A play of 0.001 stands between the load and the way that counts, so that loads start a little late.
-    through_play = np.concatenate([[0.0], np.zeros(load.size - 1)])
+    through_play = np.zeros(load.size)
     for k in range(1, load.size):
         through_play[k] = min(max(through_play[k - 1], load[k] - 1e-3), load[k] + 1e-3)
     out = BLOCK.apply(load, _conditions(load), np.array([gained, per_loading, recovery_s]))

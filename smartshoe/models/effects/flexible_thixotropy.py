@@ -99,13 +99,15 @@ class FlexibleThixotropy(Remembering):
 def _broken(conditions: Conditions, per_loading: float, recovery_s: float) -> Array:
     """(n,) the share that is broken down, by the load without its noise, that before the recording included."""
 
+    def cleaned_course() -> Array:
+        return cleaned(np.concatenate([conditions.earlier, conditions.load]), dead_zone(conditions))
+
     def made() -> Array:
         from smartshoe.kernels.structure import broken_down
 
-        earlier = conditions.earlier
-        place = cleaned(np.concatenate([earlier, conditions.load]), dead_zone(conditions))
+        place = conditions.kept("cleaned_course", (), cleaned_course)
         out = np.empty(place.size)
         broken_down(place, per_loading, conditions.step_s / recovery_s, out)
-        return out[earlier.size :]
+        return out[conditions.earlier.size :]
 
     return conditions.kept("broken_down", (per_loading, recovery_s), made)
