@@ -43,7 +43,7 @@ def names_of(
     thresholds: Thresholds,
     *,
     is_clocked: bool = False,
-    is_unsteady: bool = False,
+    is_unsure: bool = False,
     best_single: Effect | None = None,
     together: Sequence[Member] = (),
 ) -> tuple[Name, ...]:
@@ -60,9 +60,9 @@ def names_of(
 
     ``is_clocked``: peak loads rise or fall with time, so that effects that go with time imitate each other and curves;
     these are half sure at most. So is any memory effect together with a curve at the end of its range, since it may be
-    what that curve misses. ``is_unsteady``: zeros jump, and unseen jumps may imitate any effect, so that all are half
-    sure at most. Flexible blocks, and curves at the end of their kind, carry the name of the nearest law; no name is
-    given twice.
+    what that curve misses. ``is_unsure``: all are half sure at most, since zeros jump, and unseen jumps may imitate any
+    effect, or since the reading is the load's integral. Flexible blocks, and curves at the end of their kind, carry the
+    name of the nearest law; no name is given twice.
     """
     named = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
     for joint in (_named(one, residual_rms, thresholds) for one in together):
@@ -73,7 +73,7 @@ def names_of(
     is_bent = any(one.bends_too_little for one in members)
     named = [
         capped_at_half(name)
-        if is_unsteady
+        if is_unsure
         or (is_clocked and name.effect.goes_with_the_clock)
         or (is_bent and not name.member.effect.is_memoryless)
         else name

@@ -12,6 +12,7 @@ from smartshoe.diagnosis._baseline import baseline_of, has_negative_gain, with_u
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._grid import longest_step_s
+from smartshoe.diagnosis._integral import limit_integral
 from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
@@ -32,8 +33,8 @@ class Prepared:
     """``sessions``, thinned for fits, and ``fine``, at the full rate; ``start`` is the model that fits start from.
 
     ``limits`` are sentences on the data before any fit. ``is_no_unit``: the reading follows something other than the
-    unit's load. ``clocks`` are effects, with values, that put reading and load on one clock. ``is_moved``: fitted
-    readings were shifted there, each by its own lag.
+    unit's load. ``is_integral``: it follows what the load adds up to. ``clocks`` are effects, with values, that put
+    reading and load on one clock. ``is_moved``: fitted readings were shifted there, each by its own lag.
     """
 
     sessions: list[Session]
@@ -43,6 +44,7 @@ class Prepared:
     start: ExtendedModel
     excitation: Excitation
     is_no_unit: bool
+    is_integral: bool
     clocks: Sequence[tuple[Effect, Array]]
     is_moved: bool
     thresholds: Thresholds
@@ -81,6 +83,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         limit_slow_stretches(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
         for one, mask in zip(sessions, clocks.usable, strict=True)
     )
+    integral = limit_integral(sessions, thresholds)
     limits = [
         *said_of_neighbours,
         *clocks.says,
@@ -88,6 +91,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         *chain.from_iterable(slow),
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
+        *integral,
         *excitation.limits(),
     ]
     seen = [one for one in zeros_of(sessions, start, scale, 0.0, 0.0, thresholds) if one.is_seen]
@@ -95,7 +99,19 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         sessions = [replace(one, tare=tares[0]) for one in sessions]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)
+    return Prepared(
+        sessions,
+        fine,
+        scale,
+        limits,
+        start,
+        excitation,
+        is_no_unit,
+        bool(integral),
+        clocks.parts,
+        is_moved,
+        thresholds,
+    )
 
 
 def _first_parts(clocks: Aligned, lengths: Sequence[int]) -> tuple[Aligned, list[str]]:

@@ -122,7 +122,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
             residual_rms,
             thresholds,
             is_clocked=given.excitation.goes_with_the_clock,
-            is_unsteady=bool(found.zero_changes),
+            is_unsure=bool(found.zero_changes) or given.is_integral,
             best_single=found.best_single,
             together=[one for one in found.together if {one.name, *one.kin} <= left],
         )
@@ -134,7 +134,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
                 if one.name in found.cancelling_names and one.effect.kind == found.best_single.kind
             ]
             names = names_of(
-                cancelling_members, residual_rms, thresholds, is_unsteady=True, best_single=found.best_single
+                cancelling_members, residual_rms, thresholds, is_unsure=True, best_single=found.best_single
             )
         shown = NamedCauses(names, (), limits).without(
             lambda one: (

@@ -38,6 +38,22 @@ def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def driven(u, weights, first):  # type: ignore[no-untyped-def]
+    """(n,) ``first``, then the sum of ``weights`` (4,) times ``u`` two samples and one before, there, and one after.
+
+    Before its beginning ``u`` (n >= 2,) keeps its first value, and after its end it goes on along a line.
+    """
+    n = u.size
+    out = np.empty(n, weights.dtype)
+    out[0] = first
+    for k in range(1, n - 1):
+        out[k] = weights[0] * u[max(k - 2, 0)] + weights[1] * u[k - 1] + weights[2] * u[k] + weights[3] * u[k + 1]
+    last = 2.0 * u[n - 1] - u[n - 2]
+    out[n - 1] = weights[0] * u[max(n - 3, 0)] + weights[1] * u[n - 2] + weights[2] * u[n - 1] + weights[3] * last
+    return out
+
+
+@njit(cache=True)
 def lagged_by_direction(start, rise, keep_rising, fall, keep_falling):  # type: ignore[no-untyped-def]
     """w (n,), each ``keep`` times the value before plus the drive of its step: ``rise`` (n,) if w rises, else ``fall``.
 

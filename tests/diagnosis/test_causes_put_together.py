@@ -35,15 +35,17 @@ def test_a_cause_is_withheld_where_the_limits_say_why(parts: Any, why: dict[str,
     assert parts.seen["sentence_of"][1]["withheld"] is is_withheld
 
 
-def test_names_know_whether_loads_go_with_the_clock_and_zeros_change(parts: Any) -> None:
-    for there in (True, False):
+@pytest.mark.parametrize(("jumps", "is_integral"), [(False, False), (True, False), (False, True)])
+def test_names_know_what_makes_them_unsure(jumps: bool, is_integral: bool, parts: Any) -> None:
+    for is_clocked in (True, False):
         parts.seen.clear()
-        parts.given.excitation.goes_with_the_clock = there
-        parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if there else ()
+        parts.given.excitation.goes_with_the_clock = is_clocked
+        parts.given.is_integral = is_integral
+        parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if jumps else ()
         run_diagnosis(parts)
         assert parts.seen["names_of"][1] == {
-            "is_clocked": there,
-            "is_unsteady": there,
+            "is_clocked": is_clocked,
+            "is_unsure": jumps or is_integral,
             "best_single": None,
             "together": [],
         }
@@ -162,4 +164,4 @@ def test_what_does_most_by_itself_is_named_though_others_undo_it(parts: Any, mon
     assert [one.name for one in told.causes] == ["linear_leak"]
     (first, _), (second, how) = asked
     assert (first, second) == ([], ["second_relaxation", "second_relaxation"])  # of the kind of what does most alone
-    assert (how["is_unsteady"], how["best_single"]) == (True, parts.found.best_single)
+    assert (how["is_unsure"], how["best_single"]) == (True, parts.found.best_single)

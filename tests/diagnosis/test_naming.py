@@ -327,9 +327,9 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
 def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
     sure = member("play_hysteresis", size=0.05)
     assert only(names_of([sure], 0.0, STANDARD)).kind_probability > 0.5
-    (told,) = names_of([sure], 0.0, STANDARD, is_unsteady=True)  # larger than what is left, and not to be ruled out
+    (told,) = names_of([sure], 0.0, STANDARD, is_unsure=True)  # larger than what is left, and not to be ruled out
     assert (told.kind_probability, told.is_sure) == (0.5, False)
-    assert not names_of([member(size=0.05, departure_sds=9.0)], 0.06, STANDARD, is_unsteady=True)
+    assert not names_of([member(size=0.05, departure_sds=9.0)], 0.06, STANDARD, is_unsure=True)
 
 
 def test_where_none_is_sure_those_are_named_that_move_more_than_what_is_left_half_sure_at_most() -> None:

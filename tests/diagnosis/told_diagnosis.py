@@ -56,7 +56,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
             goes_with_the_clock=False, hides=lambda effect: False, shows=lambda _: True, tells_apart=frozenset(),
             channels=frozenset(),
         ),
-        is_no_unit=False, clocks=(), is_moved=False, thresholds=STANDARD,
+        is_no_unit=False, is_integral=False, clocks=(), is_moved=False, thresholds=STANDARD,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation", kin=())

@@ -71,10 +71,9 @@ def lagged_by_direction(u: Array, rising: float, falling: float) -> Array:
 
 def _drive(u: Array, x: complex, decay: complex) -> NDArray[Any]:
     """(n,) what each step adds to w, beside ``decay`` = exp(-x) times its last value."""
-    padded = np.concatenate([[u[0], u[0]], u, [2.0 * u[-1] - u[-2]]])
-    drive: NDArray[Any] = np.convolve(padded, _weights(x, decay)[::-1], "valid")
-    drive[0] = (1.0 - decay) * u[0]
-    return drive
+    from smartshoe.kernels import sensing
+
+    return np.asarray(sensing.driven(np.ascontiguousarray(u), _weights(x, decay), (1.0 - decay) * u[0]))
 
 
 class Lead(Inverse):
