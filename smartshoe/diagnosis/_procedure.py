@@ -354,10 +354,9 @@ def _outcome(
     least = max(thresholds.tolerable, thresholds.material, fault_error)
     certain_fall = 0.0 if causes else gained.certain_fall(given.scale)
     besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, certain_fall) if one > least))
-    worse = gained.is_loss or gained.growth(given.scale) > thresholds.tolerable
-    verdict = verdict_of(
-        causes, structures.before, structures.after, thresholds, is_lawful, fault_error, worse=worse, elsewhere=besides
-    )
+    doubtful = gained.is_loss or gained.growth(given.scale) > thresholds.tolerable or given.is_integral
+    left = structures.before, structures.after
+    verdict = verdict_of(causes, *left, thresholds, is_lawful, fault_error, doubtful=doubtful, elsewhere=besides)
     return _Outcome(verdict, gained, elsewhere, unproven)
 
 

@@ -40,21 +40,21 @@ def verdict_of(
     is_lawful: bool = True,
     fault_error: float = 0.0,
     *,
-    worse: bool = False,
+    doubtful: bool = False,
     elsewhere: float = 0.0,
 ) -> Verdict:
     """The verdict, from the structure left against that ``before`` and against what is tolerable.
 
     ``is_lawful``: a cause is sure and all have laws, so that what is left may be what laws usually depart by.
-    ``fault_error`` is the rms of data faults, below which nothing is seen. ``worse``: the extension is worse on
-    held-out data, for certain or by more than is tolerable. ``elsewhere`` is the `held_out_excess`, or the size of
-    effects that are followed but have no name.
+    ``fault_error`` is the rms of data faults, below which nothing is seen. ``doubtful``: the extension is worse on
+    held-out data, for certain or by more than is tolerable, or the reading is the load's integral. ``elsewhere`` is the
+    `held_out_excess`, or the size of effects that are followed but have no name.
     """
     left = unexplained_of(causes, before, after).rms
     tolerated = max(thresholds.material, thresholds.tolerable, fault_error)
     if causes:
         tolerated = max(tolerated, thresholds.departure * before.rms if is_lawful else 0.0)
-        return "partly_explained" if left > tolerated or worse or elsewhere else "explained"
+        return "partly_explained" if left > tolerated or doubtful or elsewhere else "explained"
     return "unexplained" if left > tolerated or elsewhere else "adequate"
 
 

@@ -71,7 +71,7 @@ def test_no_sensor_of_a_load_is_its_integral(name: str) -> None:
 
 def _damper(friction_n: float, viscous: float, spring: float, seed: int) -> Recording:
     """A table moves a damper to and fro; its force, with a preload, is the load, and its position the reading."""
-    time_s, turn = np.arange(0.0, 30.0, 0.01), 2.0 * np.pi * 0.8
+    time_s, turn = np.arange(0.0, 12.0, 0.01), 2.0 * np.pi * 0.8
     position, speed = 10.0 * np.sin(turn * time_s), 10.0 * turn * np.cos(turn * time_s)
     force = viscous * speed + friction_n * np.tanh(speed / 8.0) + spring * position
     rng = np.random.default_rng(seed)
@@ -88,4 +88,4 @@ def test_the_position_of_a_damper_is_told_and_nothing_is_named_for_certain(frict
     told = diagnose([_damper(friction_n, 0.6 if friction_n else 2.0, 2.0, 1)])
     assert sum("a position does that a force moves against a damper" in said for said in told.limits) == 1
     assert all(cause.confidence <= 0.5 for cause in told.causes)
-    assert told.verdict in ("unexplained", "partly_explained")
+    assert told.verdict == "partly_explained"

@@ -236,7 +236,8 @@ def test_what_is_worse_on_held_out_data_explains_a_part_at_most() -> None:
     left: Any = SimpleNamespace(rms=1e-6, significant=True)
     causes: Any = [SimpleNamespace(name="delay")]
     for given, verdicts in ((causes, ("explained", "partly_explained")), ([], ("adequate", "adequate"))):
-        assert tuple(verdict_of(given, left, left, STANDARD, worse=worse) for worse in (False, True)) == verdicts
+        told = (verdict_of(given, left, left, STANDARD, doubtful=doubtful) for doubtful in (False, True))
+        assert tuple(told) == verdicts
 
 
 def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
