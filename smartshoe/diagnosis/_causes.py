@@ -38,7 +38,7 @@ def cause_of(
     gained = gain(errors(fine, without), best, scale, thresholds)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
-        _fall_without_it(name),
+        _likelihood_ratio(name),
         *_held_out_evidence(member.size, gained, thresholds.material),
         *_nearest_rival(rivals, name.equivalents),
         *_how_sure(name, law, rivals, found, thresholds),
@@ -61,7 +61,7 @@ def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
     return tuple(one for one in sorted(near.values(), key=lambda one: one.margin) if one.effect in catalogue())
 
 
-def _fall_without_it(name: Name) -> Statement:
+def _likelihood_ratio(name: Name) -> Statement:
     """How much less probable the data is without the effect."""
     nothing = next((a.margin for a in name.member.alternatives if a.effect is None), 0.0)
     says = f"less likely by {nothing:,.0f} (-2 log likelihood, 10 is strong evidence), though other effects may take"
@@ -107,7 +107,7 @@ def _how_sure(
         if not name.equivalents:
             nearest = in_words(name.effect.name)
             why = f"{nearest} is by far the nearest, but misses more than equations usually do"
-            if law is not None and thresholds.clear * law.margin > name.member.fall:
+            if law is not None and thresholds.clear * law.margin > name.member.likelihood_ratio:
                 why = f"none of its kind follows half of it; {nearest} comes nearest"
         says = (
             f"what it does to the reading is sure, its law is not: {why}, and it may be an effect that the catalogue"
@@ -121,7 +121,7 @@ def _missed_by_law(law: Alternative | None, name: Name, thresholds: Thresholds) 
     """How much of a flexible block, or of a curve at the end of its kind, the law that names it misses."""
     if law is None:
         return []
-    missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # a share of the fall of -2 log likelihood
+    missed = 100 * max(law.margin, 0.0) / max(name.member.likelihood_ratio, 1.0)  # of the likelihood ratio
     most = 100 * thresholds.departure**2
     much = "no more" if missed <= most else "more"
     kept = "the free form" if name.member.effect.is_flexible else in_words(name.member.name)

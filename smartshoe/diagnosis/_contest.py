@@ -46,8 +46,8 @@ class Contest:
 
     def _log_odds_of(self, margin: float) -> float:
         """The log odds at a given ``margin``."""
-        fall = self.without.cost - self.cause.cost
-        return -math.log(max(float(odds_of_law(margin, fall, self.cause.likelihood.thresholds)), 1e-300))
+        ratio = self.without.cost - self.cause.cost
+        return -math.log(max(float(odds_of_law(margin, ratio, self.cause.likelihood.thresholds)), 1e-300))
 
     def refitted(self) -> Contest:
         """The same with the rival fitted further: it came from a comparison of many, which uses few steps."""

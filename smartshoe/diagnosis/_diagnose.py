@@ -9,9 +9,9 @@ import numpy as np
 
 from smartshoe.diagnosis._characteristic import characteristic_of, has_two_signs
 from smartshoe.diagnosis._continuation import content_of, without_predecessor
+from smartshoe.diagnosis._convergence import Progress
 from smartshoe.diagnosis._procedure import diagnosed
 from smartshoe.diagnosis._result import Diagnosis
-from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of, unit_of

@@ -259,12 +259,12 @@ class Evidence:
         members = tuple(sorted(members))
         key = members, of_any_law
         if key not in self._posteriors:
-            solution, fall = self._set_solution(members, None)
+            solution, bayes = self._set_solution(members, None)
             # The departure's prior is in proportion to the strength, which is first found as if the equation were
             # exact.
             for _ in range(2 if members else 0):
-                solution, fall = self._set_solution(members, self._strengths(members, solution), of_any_law=of_any_law)
-            self._posteriors[key] = self._posterior_of(members, solution, fall)
+                solution, bayes = self._set_solution(members, self._strengths(members, solution), of_any_law=of_any_law)
+            self._posteriors[key] = self._posterior_of(members, solution, bayes)
         return self._posteriors[key]
 
     def comparable_score(self, members: Members) -> float:
@@ -275,7 +275,7 @@ class Evidence:
         free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
         return self.posterior(members).score - float(sum(free))
 
-    def score_falls_with_steps(self, members: Members, steps: Sequence[StepColumns]) -> Array:
+    def score_gains_with_steps(self, members: Members, steps: Sequence[StepColumns]) -> Array:
         """(steps,) fall of a set's score when each of the sessions' ``steps``, of unit prior, joins the nuisances."""
         on_nuisances = [one.products(own) for one, own in zip(steps, self.linearisation.fitted_nuisances, strict=True)]
         cross = self._with_steps(self._all_columns, steps, on_nuisances)
@@ -310,17 +310,17 @@ class Evidence:
     def _set_solution(
         self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
     ) -> tuple[Array, float]:
-        """The solution (k,) of a set by `_solve`, and the fall of -2 log evidence."""
-        _, solution, fall = self._solve(*self._columns_and_sds(members, strengths, of_any_law=of_any_law))
-        return solution, fall
+        """The solution (k,) of a set by `_solve`, and twice its log Bayes factor against the empty one."""
+        _, solution, bayes = self._solve(*self._columns_and_sds(members, strengths, of_any_law=of_any_law))
+        return solution, bayes
 
     def _strengths(self, members: Members, solution: Array) -> tuple[Array, ...]:
         """Each member's strengths (k,), which stand first in ``solution``."""
         ends = np.cumsum([len(self.linearisation.candidates[m].columns) for m in members], dtype=np.intp)
         return tuple(np.split(self.thresholds.strength_sd * solution[: ends[-1]], ends[:-1])) if members else ()
 
-    def _posterior_of(self, members: Members, solution: Array, fall: float) -> Posterior:
-        """The posterior of a set from its solution and the ``fall`` of -2 log evidence."""
+    def _posterior_of(self, members: Members, solution: Array, bayes: float) -> Posterior:
+        """The posterior of a set from its solution and ``bayes``, twice its log Bayes factor against the empty one."""
         columns = [self.linearisation.candidates[m].columns for m in members]
         each = self._strengths(members, solution)
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
@@ -328,7 +328,7 @@ class Evidence:
         beyond = beyond[: len(members) * self._directions]  # the departures towards other laws come last
         departure_sds = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
         together = self.visible_rms([c for few in columns for c in few], self.thresholds.strength_sd * own)
-        score = self._null_score - fall + self.odds_of(members)
+        score = self._null_score - bayes + self.odds_of(members)
         return Posterior(members, score, each, sizes, tuple(departure_sds or [0.0] * len(members)), together)
 
     def _columns_and_sds(
@@ -357,7 +357,7 @@ class Evidence:
         return [column for one in family if one.slot == own.slot and one.name != own.name for column in one.columns]
 
     def _solve(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
-        """Cholesky factor of I + sqrt(D) R sqrt(D), its solution, and the fall of -2 log evidence."""
+        """Cholesky factor of I + sqrt(D) R sqrt(D), its solution, and twice the log Bayes factor."""
         inner = self._reduced[index[:, None], index] * (sds[:, None] * sds)
         inner.flat[:: index.size + 1] += 1.0
         factor = _factor(inner)
@@ -390,10 +390,10 @@ class Evidence:
             q = projected_target[columns]
             inner = np.eye(columns.shape[1]) + wide * S
             solved = np.linalg.solve(inner, q[:, :, None])[:, :, 0]
-            fall = wide * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
+            bayes = wide * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
             found += [
-                (best.score - float(fell) + self.odds_of((k,)), k, wide * strengths)
-                for k, fell, strengths in zip(numbers, fall, solved, strict=True)
+                (best.score - float(gained) + self.odds_of((k,)), k, wide * strengths)
+                for k, gained, strengths in zip(numbers, bayes, solved, strict=True)
                 if k not in best.members
             ]
         return found

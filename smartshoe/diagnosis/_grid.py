@@ -10,7 +10,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._averaging import LEAST_WINDOW, smoothed, thinning_weights
 from smartshoe.diagnosis._neighbours import neighbours_of
 from smartshoe.diagnosis._scale import Scale, reading_in
-from smartshoe.diagnosis._slow_stretches import spacing_of
+from smartshoe.diagnosis._slow_segments import spacing_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 from smartshoe.signals.masks import bridged

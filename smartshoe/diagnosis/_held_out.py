@@ -91,7 +91,7 @@ class Gain:
     is_loss: bool = False
     is_certain: bool = False
 
-    def certain_fall(self, scale: Scale) -> float:
+    def certain_gain(self, scale: Scale) -> float:
         """Rms, a share of full scale, that is removed for certain; else 0."""
         return _rms_excess(self.rmse_before, self.rmse_after, scale) if self.is_certain else 0.0
 

@@ -17,6 +17,7 @@ from smartshoe.diagnosis._arms import (
     with_creeping_arm,
 )
 from smartshoe.diagnosis._baseline import has_arm_beyond_memory, has_extreme_arm
+from smartshoe.diagnosis._convergence import Progress, beyond_bounds, converged, law_or_block, simpler, simpler_from
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._gains_and_zeros import (
     OwnGain,
@@ -36,7 +37,6 @@ from smartshoe.diagnosis._own_terms import residual_of
 from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, Linearised, is_remembered_by_gas, linearised
 from smartshoe.diagnosis._session import Session, fitted_of
-from smartshoe.diagnosis._settling import Progress, beyond_bounds, law_or_block, settled, simpler, simpler_from
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, set_of, state_at
 from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
 from smartshoe.integrity.thresholds import Thresholds
@@ -120,12 +120,12 @@ def infer(
     initial = State(evidence, best, plain)
     if has_extreme_arm(plain.model):
         initial = simpler(state_at(latency_with_usual_arm(initial)), initial)
-    state = _settled_from(initial, progress)
+    state = _converged_from(initial, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
     with_blocks, lawful = state, with_laws(state, plain.model)
     if lawful is not state:
-        state = law_or_block(settled(lawful, progress), state)
+        state = law_or_block(converged(lawful, progress), state)
     if (own_sessions := with_own_terms(state, sessions)) is not None:
         progress("going through it again beside what recordings have of their own")
         conditional = infer(start, own_sessions, thresholds, progress)
@@ -209,12 +209,12 @@ def _with_own_terms(
     )
 
 
-def _settled_from(initial: State, progress: Progress) -> State:
-    """The state that `settled` reaches from ``initial``, tried also from other relaxing arms of the baseline.
+def _converged_from(initial: State, progress: Progress) -> State:
+    """The state that `converged` reaches from ``initial``, tried also from other relaxing arms of the baseline.
 
     An effect that is missing from the model bends the baseline's arm, and a bent arm hides that effect.
     """
-    state = settled(initial, progress)
+    state = converged(initial, progress)
     if has_arm_beyond_memory(state.fit.model, initial.thresholds):
         progress("beginning anew from arms as units have")
         state = simpler_from(with_a_usual_arm(initial), state, progress)

@@ -53,7 +53,7 @@ def likelier_changes(found: Fit, evidence: Evidence, members: Sequence[Member]) 
     for one in members:
         if any(a.effect is None and a.margin < 0.0 for a in one.alternatives):
             tried.append(one.without)
-        max_margin = evidence.thresholds.law_departure**2 * max(one.fall, 0.0)
+        max_margin = evidence.thresholds.law_departure**2 * max(one.likelihood_ratio, 0.0)
         if not one.effect.why_unnamed:  # a behaviour without a law has been compared with those that come near
             tried += [a.fit for a in one.laws if a.fit is not None and a.margin < max_margin]
         other = _nearest_of_another_kind(one, found.model)
@@ -107,8 +107,8 @@ def _with_another_curve(found: Fit, about: Evidence, own_posterior: Posterior, m
         for one in bases
         if law.name not in one.model.names
     ]
-    min_fall = about.thresholds.departure**4 * max(one.fall for one in curves)
-    return [both for one, both in tried if one.cost - both.cost > min_fall]
+    min_ratio = about.thresholds.departure**4 * max(one.likelihood_ratio for one in curves)
+    return [both for one, both in tried if one.cost - both.cost > min_ratio]
 
 
 def _with_distinct_branches(fits: Sequence[Fit], candidates: Sequence[Candidate]) -> Iterator[Fit]:

@@ -43,7 +43,7 @@ class Member:
     """An effect that was found.
 
     ``size`` is the rms by which the reading moves when the effect is removed and all else refitted (``without``).
-    ``fall`` is the likelihood-ratio statistic of that: the fall of -2 log likelihood that the effect brings.
+    ``likelihood_ratio`` is the statistic of that: the fall of -2 log likelihood that the effect brings.
 
     ``alternatives`` are ordered by evidence, nearest first. ``laws`` are the other laws of the family, each fitted in
     its place. ``confounded`` are laws of other kinds that nothing in this data distinguishes from it, fitted likewise
@@ -53,7 +53,8 @@ class Member:
     the rms by which the other members' equations depart. ``likeness`` is the largest cosine between its contribution
     and that of another member, at least 0.
 
-    ``kin`` are members of its kind that ``size``, ``fall`` and ``without`` take together with it (`taken_together`).
+    ``kin`` are members of its kind that ``size``, ``likelihood_ratio`` and ``without`` take together with it
+    (`taken_together`).
 
     ``is_at_end_of_kind``: a shape lies where the effect turns into one of another kind. ``bends_too_little``: it is a
     curve at the end of its range.
@@ -65,7 +66,7 @@ class Member:
     alternatives: tuple[Alternative, ...]
     without: Fit
     laws: tuple[Alternative, ...]
-    fall: float
+    likelihood_ratio: float
     others_departure_rms: float = 0.0
     likeness: float = 0.0
     is_at_end_of_kind: bool = False
@@ -152,7 +153,7 @@ def taken_together(members: Sequence[Member], evidence: Evidence, best: Posterio
             replace(
                 largest,
                 size=float(sizes[0]),
-                fall=without.cost - extended.cost,
+                likelihood_ratio=without.cost - extended.cost,
                 without=without,
                 alternatives=(Alternative(None, _margin_to(left, evidence, best)),),
                 others_departure_rms=departure * math.hypot(*(one.departure_sds * one.size for one in others)),

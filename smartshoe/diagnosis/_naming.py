@@ -107,13 +107,13 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
     kind = probability_of_kind(one, residual_rms, thresholds)
     is_sure = kind >= thresholds.least_confidence
     law_in_place = _law_in_its_place(one)
-    if law_in_place is not None and law_in_place.margin <= thresholds.departure**2 * one.fall:
+    if law_in_place is not None and law_in_place.margin <= thresholds.departure**2 * one.likelihood_ratio:
         # The block is how that law departs: its rivals are compared with that law.
         followed = catalogue()[str(law_in_place.effect)]
         # A curve that is alone in its kind has all other curves as rivals.
         kin = _other_laws_of_family(followed) or tuple(str(a.effect) for a in one.laws if a is not law_in_place)
         other_laws = tuple(replace(a, margin=a.margin - law_in_place.margin) for a in one.laws if a.effect in kin)
-        as_law = replace(one, laws=other_laws, fall=one.fall - law_in_place.margin)
+        as_law = replace(one, laws=other_laws, likelihood_ratio=one.likelihood_ratio - law_in_place.margin)
         return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, law_in_place)
     if not (one.effect.is_flexible or one.is_any_curve):
         law, equivalents = probability_of_law(one, thresholds)
@@ -123,7 +123,7 @@ def _named(one: Member, residual_rms: float, thresholds: Thresholds) -> Name:
     others = dict.fromkeys((*_other_laws_of_family(nearest), *(str(a.effect) for a in one.laws)))
     others.pop(nearest.name, None)
     # A law that follows less than half of it is no equivalent.
-    ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
+    ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.likelihood_ratio}
     kin = tuple(name for name in others if name not in ruled_out)
     # One half at most: where all others are ruled out, it may still be a law that the catalogue does not have.
     return Name(one, nearest, kind, 1.0 / (1.0 + max(len(kin), 1)), kin, True, is_sure)
@@ -143,11 +143,11 @@ def _with_confounded(name: Name, thresholds: Thresholds) -> Name:
     itself.
     """
     member = name.member
-    alike = [one for one in member.confounded if one.margin <= thresholds.departure**4 * member.fall]
+    alike = [one for one in member.confounded if one.margin <= thresholds.departure**4 * member.likelihood_ratio]
     if not alike:
         return name
     others = dict.fromkeys((*name.equivalents, *(str(one.effect) for one in alike)))
-    nearest = float(odds_of_law(min(one.margin for one in alike), member.fall, thresholds))
+    nearest = float(odds_of_law(min(one.margin for one in alike), member.likelihood_ratio, thresholds))
     law = min(name.law_probability, 1.0 / (1.0 + nearest))
     return replace(name, law_probability=law, equivalents=tuple(others))
 
@@ -214,16 +214,20 @@ def confidence_of(name: Name) -> float:
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
     """The probability of this law against its nearest rival, and the laws that this data cannot rule out."""
-    odds = {a.effect: float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws if a.effect is not None}
+    odds = {
+        a.effect: float(odds_of_law(a.margin, one.likelihood_ratio, thresholds))
+        for a in one.laws
+        if a.effect is not None
+    }
     equivalents = tuple(name for name, other in odds.items() if other > thresholds.equivalent_odds)
     return 1.0 / (1.0 + max(odds.values(), default=0.0)), equivalents
 
 
-def odds_of_law(margin: Array | float, fall: float, thresholds: Thresholds) -> Array:
-    """Odds of a rival law that fits worse by ``margin``, where the named law brings ``fall`` (-2 log likelihood).
+def odds_of_law(margin: Array | float, likelihood_ratio: float, thresholds: Thresholds) -> Array:
+    """Odds of a rival law that fits worse by ``margin``, where the named law brings ``likelihood_ratio``.
 
     No law is exact: a rival that misses no more than the squared usual departure of what this law explains is as good.
     So the margin is counted in units of that square plus one, the usual gain from noise alone.
     """
-    unit = 2.0 * (1.0 + thresholds.departure**2 * max(fall, 0.0))
+    unit = 2.0 * (1.0 + thresholds.departure**2 * max(likelihood_ratio, 0.0))
     return np.exp(-np.maximum(margin, 0.0) / unit)

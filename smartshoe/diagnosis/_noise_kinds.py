@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
+from smartshoe.diagnosis._reported_lines import lines_of, reported_tones
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._told_lines import lines_of, told_tones
 from smartshoe.display import percent
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import NoiseEffect, catalogue
@@ -74,7 +74,7 @@ def _shown(
         return
     prediction = model.simulate(session.conditions)
     residual = session.reading - prediction
-    residual = residual - told_tones(session, residual, lines_of(session, known))
+    residual = residual - reported_tones(session, residual, lines_of(session, known))
     for noise in kinds:
         if faults.isdisjoint({noise.name, *noise.imitated_by}):
             one = noise.evidence(residual, session.conditions, prediction)

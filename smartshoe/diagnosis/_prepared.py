@@ -18,7 +18,7 @@ from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import logged_words
 from smartshoe.diagnosis._session import Session, at_full_rate, prepare
-from smartshoe.diagnosis._slow_stretches import limit_slow_stretches
+from smartshoe.diagnosis._slow_segments import limit_slow_segments
 from smartshoe.diagnosis._zero import zeros_of
 from smartshoe.display import first_names
 from smartshoe.integrity import Integrity
@@ -80,7 +80,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     friction = [friction_of(recording, thresholds) for recording in following]  # a lag would look like friction
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
     slow = (
-        limit_slow_stretches(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
+        limit_slow_segments(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
         for one, mask in zip(sessions, clocks.usable, strict=True)
     )
     integral = limit_integral(sessions, thresholds)

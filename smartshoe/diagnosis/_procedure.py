@@ -10,6 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
+from smartshoe.diagnosis._convergence import Progress
 from smartshoe.diagnosis._force import (
     Compensation,
     compensation,
@@ -45,12 +46,11 @@ from smartshoe.diagnosis._own_terms import own_terms_of, residual_of
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import loads_beyond_fit
+from smartshoe.diagnosis._reported_lines import as_thinned, lines_of, reported_tones
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
-from smartshoe.diagnosis._settling import Progress
-from smartshoe.diagnosis._told_lines import as_thinned, lines_of, told_tones
 from smartshoe.diagnosis._validation import error_of, fitted_rms
 from smartshoe.diagnosis._verdict import (
     fault_rms,
@@ -283,7 +283,7 @@ def _without_tones(
     thinned, fine = [*thinned], [*fine]
     for k, session in enumerate(given.sessions):
         if lines_hz := lines_of(session, told):
-            tones = told_tones(given.fine[k], fine[k], lines_hz)
+            tones = reported_tones(given.fine[k], fine[k], lines_hz)
             thinned[k], fine[k] = thinned[k] - as_thinned(tones, session), fine[k] - tones
     return thinned, fine
 
@@ -352,8 +352,8 @@ def _outcome(
     is_lawful = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
     # What the model follows is real, even without a name, or with too little left to be tested.
     least = max(thresholds.tolerable, thresholds.material, fault_error)
-    certain_fall = 0.0 if causes else gained.certain_fall(given.scale)
-    besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, certain_fall) if one > least))
+    certain_gain = 0.0 if causes else gained.certain_gain(given.scale)
+    besides = max(elsewhere, unproven, *(one for one in (named.unnamed_rms, certain_gain) if one > least))
     doubtful = gained.is_loss or gained.growth(given.scale) > thresholds.tolerable or given.is_integral
     left = structures.before, structures.after
     verdict = verdict_of(causes, *left, thresholds, is_lawful, fault_error, doubtful=doubtful, elsewhere=besides)

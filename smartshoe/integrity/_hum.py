@@ -66,7 +66,7 @@ def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
     """
     if view.span == 0.0:
         return []
-    stretches = _quiet_stretches(view)
+    stretches = _quiet_segments(view)
     size = sum(last - first for first, last in stretches)
     if size < 128:
         return []
@@ -84,7 +84,7 @@ def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
     return found
 
 
-def _quiet_stretches(view: View) -> list[tuple[int, int]]:
+def _quiet_segments(view: View) -> list[tuple[int, int]]:
     """Stretches of rest, (first, past last) sample: a few blocks or more in which the load's block means stand still.
 
     A block is as long as a sensor's lag. The first block of each stretch is left out, since the reading may still

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from told_evidence import STANDARD
 
-from smartshoe.diagnosis import _arms, _laws, _settling
+from smartshoe.diagnosis import _arms, _convergence, _laws
 from smartshoe.diagnosis._arms import arms_of, effect_count
 from smartshoe.diagnosis._baseline import has_arm_beyond_memory, has_extreme_arm
 from smartshoe.diagnosis._laws import (
@@ -209,13 +209,13 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
         banned.append(without)
         return state(f"tried {found[-1]}")
 
-    monkeypatch.setattr(_settling, "arms_of", lambda model: [("a", "arm a"), ("b", "arm b")])
-    monkeypatch.setattr(_settling, "with_arm", swapped)
-    monkeypatch.setattr(_settling, "fit", lambda likelihood, model: model)
-    monkeypatch.setattr(_settling, "_is_simpler", lambda *given: simpler)
-    monkeypatch.setattr(_settling, "state_at", stated)
-    monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
-    assert _settling.settled(state("first"), lambda said: None).name == ends  # type: ignore[attr-defined]
+    monkeypatch.setattr(_convergence, "arms_of", lambda model: [("a", "arm a"), ("b", "arm b")])
+    monkeypatch.setattr(_convergence, "with_arm", swapped)
+    monkeypatch.setattr(_convergence, "fit", lambda likelihood, model: model)
+    monkeypatch.setattr(_convergence, "_is_simpler", lambda *given: simpler)
+    monkeypatch.setattr(_convergence, "state_at", stated)
+    monkeypatch.setattr(_convergence, "replace", lambda one, **given: one)
+    assert _convergence.converged(state("first"), lambda said: None).name == ends  # type: ignore[attr-defined]
     assert tried == [("without a", "arm a"), ("without b", "arm b")]
     assert banned == [("z",), ("z",)] * simpler
 
@@ -268,7 +268,7 @@ def _weighed(
     made = tuple(Alternative(law, margin, fits[law]) for law, margin in laws)
     others = [Alternative(other, 1.0, shape={"at": 3.0}) for other in ("delay", "near", "dead_band", "gas_heat")]
     return SimpleNamespace(
-        name=name, fall=100.0, departure_sds=departure_sds, laws=made,
+        name=name, likelihood_ratio=100.0, departure_sds=departure_sds, laws=made,
         alternatives=(Alternative(None, nothing), *others),
         without=SimpleNamespace(model=f"without {name}"), size=size, is_at_end_of_kind=is_at_end_of_kind,
         effect=SimpleNamespace(why_unnamed="", is_memoryless=False),
@@ -316,7 +316,7 @@ def test_a_curve_of_another_branch_is_tried_beside_a_law_and_beside_the_nearest_
 
     monkeypatch.setattr(_laws, "fit_with", with_law)
     laws = [Alternative(name, 1.0, fitted(name)) for name in ("first", "second", "third")]
-    member: Any = SimpleNamespace(effect=there, laws=laws, fall=fall)
+    member: Any = SimpleNamespace(effect=there, laws=laws, likelihood_ratio=fall)
     own: Any = SimpleNamespace(members=(0,), score=10.0)
     tried = _with_another_curve(fitted("found", curve), about, own, [member])
     assert [(one.model.is_of, one.model.names) for one in tried] == [  # type: ignore[attr-defined]

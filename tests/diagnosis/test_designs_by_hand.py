@@ -200,7 +200,7 @@ def _contested(cause: float, rival: float, without: float) -> Contest:
 
 
 def test_a_contest_is_weighed_as_laws_are() -> None:
-    """Margin over 2 (1 + departure^2 fall), nothing where the rival follows better; never without an end."""
+    """Margin over 2 (1 + departure^2 ratio), nothing where the rival follows better; never without an end."""
     one = _contested(100.0, 350.0, 1100.0)
     assert one.margin == 250.0
     assert one.log_odds == pytest.approx(250.0 / (2.0 * (1.0 + 0.0625 * 1000.0)))
@@ -527,14 +527,15 @@ def _member(
     size: float = 0.01,
     departure_sds: float = 0.5,
     margin: float | None = 40.0,
-    fall: float = 100.0,
+    likelihood_ratio: float = 100.0,
     laws: tuple[tuple[str | None, float], ...] = (),
     others: float = 0.0,
     likeness: float = 0.0,
 ) -> Any:
     near = () if margin is None else (SimpleNamespace(effect="delay", margin=1.0), Alternative(None, margin))
     return SimpleNamespace(
-        effect=effect("linear_leak"), size=size, departure_sds=departure_sds, alternatives=near, fall=fall,
+        effect=effect("linear_leak"), size=size, departure_sds=departure_sds, alternatives=near,
+        likelihood_ratio=likelihood_ratio,
         laws=tuple(Alternative(name, by) for name, by in laws), others_departure_rms=others, likeness=likeness,
         is_any_curve=False, confounded=(), bends_too_little=False,
     )  # fmt: skip
@@ -555,8 +556,8 @@ def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
 
 
 def test_a_law_is_as_sure_as_its_nearest_rivals_odds_say() -> None:
-    """Margins in units of twice one and of the squared departure times the fall."""
-    found = _member(fall=100.0, laws=((None, 0.0), ("orifice_leak", 12.0), ("zero_drift", 30.0)))
+    """Margins in units of twice one and of the squared departure times the likelihood ratio."""
+    found = _member(likelihood_ratio=100.0, laws=((None, 0.0), ("orifice_leak", 12.0), ("zero_drift", 30.0)))
     law, equivalents = probability_of_law(found, STANDARD)
     assert law == pytest.approx(1.0 / (1.0 + math.exp(-12.0 / (2.0 * 7.25))))
     ruled = {name: math.exp(-by / (2.0 * 7.25)) for name, by in (("orifice_leak", 12.0), ("zero_drift", 30.0))}
@@ -565,7 +566,7 @@ def test_a_law_is_as_sure_as_its_nearest_rivals_odds_say() -> None:
     for by, told in ((0.999, ("orifice_leak",)), (1.001, ())):
         assert probability_of_law(_member(laws=(("orifice_leak", by * bound),)), STANDARD)[1] == told
     # What explains nothing departs by nothing; a rival that follows better is as good at the most.
-    below = _member(fall=-50.0, laws=(("orifice_leak", 3.0),))
+    below = _member(likelihood_ratio=-50.0, laws=(("orifice_leak", 3.0),))
     assert probability_of_law(below, STANDARD)[0] == pytest.approx(1.0 / (1.0 + math.exp(-1.5)))
     better = _member(laws=(("orifice_leak", -9.0),))
     assert probability_of_law(better, STANDARD)[0] == 0.5

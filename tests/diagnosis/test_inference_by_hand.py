@@ -115,11 +115,11 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
             likelihood=lambda: "likelihood",
         )  # fmt: skip
 
-    def settled(one: Any, progress: Any) -> Any:
-        return state(f"settled {one.name}")
+    def converged(one: Any, progress: Any) -> Any:
+        return state(f"converged {one.name}")
 
     def simpler_from(begun: Any, one: Any, progress: Any) -> Any:
-        return state(f"(settled {begun.name} or {one.name})")
+        return state(f"(converged {begun.name} or {one.name})")
 
     def named(name: str) -> Callable[..., Any]:
         return lambda one, *rest: state(f"{name} {one.name}")
@@ -159,7 +159,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "has_extreme_arm", lambda model: told.stretched)
     monkeypatch.setattr(_inference, "has_arm_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
-    monkeypatch.setattr(_inference, "settled", settled)
+    monkeypatch.setattr(_inference, "converged", converged)
     monkeypatch.setattr(_inference, "simpler_from", simpler_from)
     monkeypatch.setattr(_inference, "simpler", lambda other, one: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "latency_with_usual_arm", named("late"))
@@ -184,7 +184,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
-    assert flow.infer().fit.model == "settled first"
+    assert flow.infer().fit.model == "converged first"
     for flow.independent, is_unit, can_validate in ((1, True, False), (2, False, True), (1, False, False)):
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
@@ -207,16 +207,20 @@ def test_what_can_be_left_out_in_one_way_only_validates_nothing(flow: Any, folds
 def test_what_is_told_is_without_what_another_effect_makes_immaterial(flow: Any) -> None:
     """The first set, and each that a likelier one leads to; from the plain fit on."""
     flow.infer()
-    assert flow.weighed == [("settled first", True)]
+    assert flow.weighed == [("converged first", True)]
     flow.weighed, flow.changes = [], [["law"], ["other"]]
     flow.infer()
-    assert flow.weighed == [("settled first", True), ("other settled first", True), ("law other settled first", True)]
+    assert flow.weighed == [
+        ("converged first", True),
+        ("other converged first", True),
+        ("law other converged first", True),
+    ]
 
 
 def test_changes_are_tried_until_one_leads_to_a_likelier_set(flow: Any) -> None:
     flow.members, flow.changes = (_Sure(0.9),), [["c", "d"], ["a", "b"]]
-    flow.unlikely = ("a settled first", "c b settled first", "d b settled first")
-    assert flow.infer().fit.model == "b settled first"
+    flow.unlikely = ("a converged first", "c b converged first", "d b converged first")
+    assert flow.infer().fit.model == "b converged first"
     assert flow.changeable == [["member"], ["member"]]
     flow.plain.model.names, flow.changeable = ("member",), []  # a clock, told before any model
     flow.infer()
@@ -309,10 +313,10 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
     is_validated = [True, True, True]  # of each that is told, from the innermost on
     monkeypatch.setattr(_inference, "predicts_better", lambda *given: is_validated.pop())
     found = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
-    assert found.own_gains == ("changing", "settled first")  # those that were told at last
+    assert found.own_gains == ("changing", "converged first")  # those that were told at last
     assert asked == ["shared", "own", "changing"]
     assert "going through it again beside what recordings have of their own" in flow.said
-    assert (found.fit.model, found.members) == ("settled first", (0.9,))
+    assert (found.fit.model, found.members) == ("converged first", (0.9,))
     is_validated = [False, True]
     other = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
     assert (other.fit, other.members, other.own_gains) == (other.baseline, (), found.own_gains)
@@ -322,46 +326,46 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
 
 def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> None:
     flow.stretched = True
-    assert flow.infer().fit.model == "settled (late first or first)"
+    assert flow.infer().fit.model == "converged (late first or first)"
     flow.beyond = True  # from what the search began with
-    assert flow.infer().fit.model == "(settled usual (late first or first) or settled (late first or first))"
+    assert flow.infer().fit.model == "(converged usual (late first or first) or converged (late first or first))"
     assert "beginning anew from arms as units have" in flow.said
     flow.stretched = False
-    assert flow.infer().fit.model == "(settled usual first or settled first)"
+    assert flow.infer().fit.model == "(converged usual first or converged first)"
     flow.beyond = False
     flow.chosen = [SimpleNamespace(effect=effect("dead_band"))]
-    assert flow.infer().fit.model == "settled first"
+    assert flow.infer().fit.model == "converged first"
     flow.chosen.append(SimpleNamespace(effect=effect("linear_leak")))
-    assert flow.infer().fit.model == "(settled pole settled first or settled first)"
+    assert flow.infer().fit.model == "(converged pole converged first or converged first)"
     flow.chosen, flow.share = [], -0.01
-    assert flow.infer().fit.model == "(settled creeping settled first or settled first)"
+    assert flow.infer().fit.model == "(converged creeping converged first or converged first)"
     flow.share = 0.0
-    assert flow.infer().fit.model == "settled first"
+    assert flow.infer().fit.model == "converged first"
     flow.lawful = flow.state("lawful")
-    assert flow.infer().fit.model == "settled lawful"
+    assert flow.infer().fit.model == "converged lawful"
     flow.is_law = False
-    assert flow.infer().fit.model == "settled first"
+    assert flow.infer().fit.model == "converged first"
     flow.lawful, flow.changes = None, [["law"], ["other"]]
-    assert flow.infer().fit.model == "law other settled first"
+    assert flow.infer().fit.model == "law other converged first"
 
 
 def test_what_ended_at_a_bound_goes_on_beyond_it_where_that_is_validated_and_leaves_less(flow: Any) -> None:
-    flow.ended, flow.errors = {"settled first": ("creep",)}, {"freed settled first": 0.9}
-    assert flow.infer().fit.model == "freed settled first"
+    flow.ended, flow.errors = {"converged first": ("creep",)}, {"freed converged first": 0.9}
+    assert flow.infer().fit.model == "freed converged first"
     flow.changes = [["law"], []]
-    assert flow.infer().fit.model == "law freed settled first"
-    flow.stepped = ("freed settled first",)
-    assert flow.infer().fit.model == "settled first"
-    flow.stepped, flow.errors = (), {"freed settled first": 1.0}
-    assert flow.infer().fit.model == "settled first"
-    flow.ended, flow.errors = {}, {"freed settled first": 0.9}
-    assert flow.infer().fit.model == "settled first"
+    assert flow.infer().fit.model == "law freed converged first"
+    flow.stepped = ("freed converged first",)
+    assert flow.infer().fit.model == "converged first"
+    flow.stepped, flow.errors = (), {"freed converged first": 1.0}
+    assert flow.infer().fit.model == "converged first"
+    flow.ended, flow.errors = {}, {"freed converged first": 0.9}
+    assert flow.infer().fit.model == "converged first"
 
 
 def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> None:
     """And it is the answer where nothing else is left."""
     least = STANDARD.least_confidence
-    flow.members, flow.refused = (_Sure(0.1), _Sure(0.99 * least)), {"settled first": ("b", "curve")}
+    flow.members, flow.refused = (_Sure(0.1), _Sure(0.99 * least)), {"converged first": ("b", "curve")}
     assert flow.infer().best_single is None
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
@@ -373,9 +377,9 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     assert (found.best_single, found.fit, found.members) == ("a curve", judged.fit, ("curve",))
     assert found.together == "a curve alone"
     assert found.refused == ("b",)
-    flow.parts = {"settled first": (part, part)}
+    flow.parts = {"converged first": (part, part)}
     found = flow.infer()
-    assert (found.best_single, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
+    assert (found.best_single, found.fit.model, found.members) == ("a curve", "converged first", flow.members)
     assert found.together == (flow.members, "together")
     flow.members = (_Sure(0.1), _Sure(least))
     assert flow.infer().best_single is None
@@ -448,17 +452,17 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
 @pytest.mark.parametrize(
     ("refused", "stepped", "error", "kept"),
     [
-        ("law", (), 0.9, "settled first"),
-        ("law", (), 1.1, "settled lawful"),  # the block follows no better
-        ("law", ("settled first",), 0.9, "settled lawful"),  # nor does it stand
-        ("other", (), 0.9, "settled lawful"),
-        ("other", ("settled lawful",), 0.9, "settled first"),  # what stands, for what does not
+        ("law", (), 0.9, "converged first"),
+        ("law", (), 1.1, "converged lawful"),  # the block follows no better
+        ("law", ("converged first",), 0.9, "converged lawful"),  # nor does it stand
+        ("other", (), 0.9, "converged lawful"),
+        ("other", ("converged lawful",), 0.9, "converged first"),  # what stands, for what does not
     ],
 )
 def test_where_a_law_is_not_the_same_in_each_recording_its_block_stays(
     flow: Any, refused: str, stepped: tuple[str, ...], error: float, kept: str
 ) -> None:
-    flow.names = {"settled first": ("block", "other"), "lawful": ("law", "other")}
-    flow.lawful, flow.refused, flow.stepped = flow.state("lawful"), {"settled lawful": (refused,)}, stepped
-    flow.errors = {"settled first": error}
+    flow.names = {"converged first": ("block", "other"), "lawful": ("law", "other")}
+    flow.lawful, flow.refused, flow.stepped = flow.state("lawful"), {"converged lawful": (refused,)}, stepped
+    flow.errors = {"converged first": error}
     assert flow.infer().fit.model == kept

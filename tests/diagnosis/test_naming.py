@@ -40,12 +40,14 @@ NOWHERE = Fit(MODEL, 0.0, Likelihood((), 1.0, MODEL, Thresholds()))
 def member(
     of: str | Effect = "linear_leak",
     size: float = 0.01,
-    fall: float = 1000.0,
+    likelihood_ratio: float = 1000.0,
     departure_sds: float = 0.1,
     laws: tuple[tuple[str, float], ...] = (),
 ) -> Member:
     one = effect(of) if isinstance(of, str) else of
-    return Member(one, size, departure_sds, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
+    return Member(
+        one, size, departure_sds, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), likelihood_ratio
+    )
 
 
 def only(names: tuple[Name, ...]) -> Name:
@@ -55,23 +57,29 @@ def only(names: tuple[Name, ...]) -> Name:
 
 # -- which law ------------------------------------------------------------------------------------------------
 @given(st.floats(0.0, 1e6))
-def test_two_laws_in_a_dead_heat_share_the_probability_and_name_each_other(fall: float) -> None:
+def test_two_laws_in_a_dead_heat_share_the_probability_and_name_each_other(likelihood_ratio: float) -> None:
     for one, other in (("linear_leak", "orifice_leak"), ("orifice_leak", "linear_leak")):
-        share, equivalents = probability_of_law(member(one, fall=fall, laws=((other, 0.0),)), STANDARD)
+        share, equivalents = probability_of_law(
+            member(one, likelihood_ratio=likelihood_ratio, laws=((other, 0.0),)), STANDARD
+        )
         assert share == pytest.approx(0.5)
         assert equivalents == (other,)
 
 
 @given(st.floats(0.0, 1e5), st.floats(0.0, 1e3), st.floats(0.0, 1e3))
-def test_the_farther_the_rival_the_surer_the_law(fall: float, margin: float, further: float) -> None:
-    near, far = (member(fall=fall, laws=(("orifice_leak", by),)) for by in (margin, margin + further))
+def test_the_farther_the_rival_the_surer_the_law(likelihood_ratio: float, margin: float, further: float) -> None:
+    near, far = (
+        member(likelihood_ratio=likelihood_ratio, laws=(("orifice_leak", by),)) for by in (margin, margin + further)
+    )
     assert probability_of_law(near, STANDARD)[0] <= probability_of_law(far, STANDARD)[0]
     assert set(probability_of_law(far, STANDARD)[1]) <= set(probability_of_law(near, STANDARD)[1])
 
 
 def test_a_rival_that_leaves_as_much_as_laws_usually_depart_is_one_standard_deviation_away() -> None:
-    fall = 1e9  # so that noise counts for nothing beside departures
-    rival = member(fall=fall, laws=(("orifice_leak", STANDARD.departure**2 * fall),))
+    likelihood_ratio = 1e9  # so that noise counts for nothing beside departures
+    rival = member(
+        likelihood_ratio=likelihood_ratio, laws=(("orifice_leak", STANDARD.departure**2 * likelihood_ratio),)
+    )
     assert probability_of_law(rival, STANDARD)[0] == pytest.approx(1.0 / (1.0 + math.exp(-0.5)), rel=1e-6)
 
 
@@ -133,7 +141,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     """But for those that follow less than half of it."""
     (block, *_) = blocks()["static_curve"]
     margins = (("contact_area", 3.0), ("gas_compression", 900.0), ("wall_hardening", 40.0))
-    name = only(names_of([member(block, laws=margins, fall=47.0)], 0.0, STANDARD))
+    name = only(names_of([member(block, laws=margins, likelihood_ratio=47.0)], 0.0, STANDARD))
     family = {one.name for one in catalogue().values() if one.kind == "static_curve"}
     assert name.kind_only
     assert name.effect.name == "contact_area"
@@ -142,7 +150,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.law_probability == pytest.approx(1.0 / (len(family) - 2))
     # Where all others follow less than half of it, no law is sure all the same: it may be none of the catalogue's.
     far = tuple((one, 900.0) for one in family - {"contact_area"})
-    lone = only(names_of([member(block, laws=(("contact_area", 9.0), *far), fall=47.0)], 0.0, STANDARD))
+    lone = only(names_of([member(block, laws=(("contact_area", 9.0), *far), likelihood_ratio=47.0)], 0.0, STANDARD))
     assert (lone.kind_only, lone.equivalents, lone.law_probability) == (True, (), 0.5)
 
 
@@ -160,7 +168,7 @@ def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_
         if is_law:
             assert (name.effect.name, name.law_in_place, name.member) == (law, one.laws[0], one)
             assert name.kind_probability == probability_of_kind(one, 0.0, STANDARD)
-            as_law = member(law, laws=rivals[:1] if of == "zero" else rivals, fall=1000.0 - margin)
+            as_law = member(law, laws=rivals[:1] if of == "zero" else rivals, likelihood_ratio=1000.0 - margin)
             assert (name.law_probability, name.equivalents) == probability_of_law(as_law, STANDARD)
             assert name.equivalents == (("zero_drift",) if of == "zero" else ("saturation", "wall_hardening"))
         else:
@@ -170,7 +178,7 @@ def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_
 def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> None:
     (block, *_) = blocks()["static_curve"]
     margins = (("dead_band", 90.0), ("contact_area", 95.0), ("saturation", 499.0), ("wall_hardening", 501.0))
-    one = member(block, laws=margins, fall=1000.0)
+    one = member(block, laws=margins, likelihood_ratio=1000.0)
     name = only(names_of([one], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == (
         "dead_band",
@@ -213,7 +221,7 @@ def test_a_block_beside_the_law_that_is_its_nearest_is_that_laws_departure_and_n
 def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_well() -> None:
     """A dead band of a third of full scale is a curve like any other; one of its own kind is a dead band."""
     laws = (("sensor_nonlinearity", 20.0), ("gas_compression", 60.0))
-    one = replace(member("dead_band", size=0.02, laws=laws, fall=1000.0), is_at_end_of_kind=True)
+    one = replace(member("dead_band", size=0.02, laws=laws, likelihood_ratio=1000.0), is_at_end_of_kind=True)
     name = only(names_of([one], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == ("sensor_nonlinearity", ("gas_compression",), False)
     assert name.law_in_place is one.laws[0]
@@ -404,7 +412,7 @@ def test_kind_odds_are_the_logistics_coefficients() -> None:
 
 @given(st.floats(0.0, 60.0))
 def test_where_an_effect_brings_nothing_a_margin_is_evidence_as_it_stands(margin: float) -> None:
-    rival = member(fall=0.0, laws=(("orifice_leak", margin),))
+    rival = member(likelihood_ratio=0.0, laws=(("orifice_leak", margin),))
     assert probability_of_law(rival, STANDARD)[0] == pytest.approx(1.0 / (1.0 + math.exp(-margin / 2.0)))
 
 
@@ -426,14 +434,14 @@ def test_what_nothing_accounts_for_as_well_is_there_or_not_by_even_odds() -> Non
 
 
 def test_departure_counts_margins_where_an_effect_brings_much() -> None:
-    rival = member(fall=10_000.0, laws=(("orifice_leak", 500.0),))
+    rival = member(likelihood_ratio=10_000.0, laws=(("orifice_leak", 500.0),))
     exact, loose = (probability_of_law(rival, replace(STANDARD, departure=by))[0] for by in (0.02, 0.5))
     assert loose < 0.6 < 0.99 < exact
 
 
 @pytest.mark.parametrize(("field", "few", "many"), [("departure", 0.02, 0.5), ("equivalent_odds", 0.9, 0.01)])
 def test_laws_are_ruled_out_by_departure_and_equivalent_odds(field: str, few: float, many: float) -> None:
-    rival = member(fall=10_000.0, laws=(("orifice_leak", 2_000.0),))
+    rival = member(likelihood_ratio=10_000.0, laws=(("orifice_leak", 2_000.0),))
     assert probability_of_law(rival, replace(STANDARD, **{field: few}))[1] == ()
     assert probability_of_law(rival, replace(STANDARD, **{field: many}))[1] == ("orifice_leak",)
 

@@ -237,7 +237,10 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0, likelihood=likelihood)
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
     found = members_of(evidence, best, extended)
-    assert [(m.name, m.departure_sds, m.fall) for m in found] == [("dead_band", 0.7, 70.0), ("linear_leak", 0.3, 30.0)]
+    assert [(m.name, m.departure_sds, m.likelihood_ratio) for m in found] == [
+        ("dead_band", 0.7, 70.0),
+        ("linear_leak", 0.3, 30.0),
+    ]
     assert [m.size for m in found] == pytest.approx([sizes["dead_band"], sizes["linear_leak"]])
     assert [m.likeness for m in found] == pytest.approx([math.sqrt(0.5)] * 2)
     assert [m.others_departure_rms for m in found] == pytest.approx(

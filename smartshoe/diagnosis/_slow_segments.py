@@ -57,7 +57,7 @@ def spacing_of(time_s: Array, load: Array, at_s: Array, longest_s: float, thresh
     return Spacing(after, is_even[after - 1] & (at_s <= time_s[-1]), is_close[after - 1])
 
 
-def limit_slow_stretches(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> list[str]:
+def limit_slow_segments(recording: Recording, usable: Mask, longest_s: float, thresholds: Thresholds) -> list[str]:
     """The sentence on stretches whose samples are more than ``longest_s`` apart."""
     if recording.is_uniform:
         return []

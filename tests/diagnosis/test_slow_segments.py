@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._prepared import prepared
-from smartshoe.diagnosis._slow_stretches import limit_slow_stretches, spacing_of
+from smartshoe.diagnosis._slow_segments import limit_slow_segments, spacing_of
 from smartshoe.integrity import examine
 from smartshoe.recording import Recording
 
@@ -92,21 +92,21 @@ def test_between_quick_stretches_the_slow_ones_are_as_far_apart_as_they_are() ->
     time_s = np.concatenate([start + np.concatenate([pulse, rest]) for start in (0.0, 2040.0)])
     load = np.where(np.fmod(time_s, 2040.0) < 40.0, 5.0, 1.0 + np.sin(time_s))
     run = Recording.from_arrays(time_s=time_s, force_n=load, cell_v=3.0 + 0.1 * load)
-    (said,) = limit_slow_stretches(run, np.ones(len(run), dtype=bool), 0.35, STANDARD)
+    (said,) = limit_slow_segments(run, np.ones(len(run), dtype=bool), 0.35, STANDARD)
     assert "samples are 10 s apart there; to follow this load, fits need one every 0.35 s" in said
 
 
 def test_nothing_is_said_of_what_is_logged_evenly_or_shakes() -> None:
     run = _run(1, "even")
     usable = np.ones(len(run), dtype=bool)
-    assert limit_slow_stretches(run, usable, 0.001, STANDARD) == []
+    assert limit_slow_segments(run, usable, 0.001, STANDARD) == []
     rng = np.random.default_rng(1)
     shaken = Recording.from_arrays(
         time_s=run.time_s + 0.004 * rng.uniform(-1.0, 1.0, len(run)),
         force_n=run.force_n,
         pressure_mbar=run.sensor.values,
     )
-    assert limit_slow_stretches(shaken, usable, 0.035, STANDARD) == []
+    assert limit_slow_segments(shaken, usable, 0.035, STANDARD) == []
 
 
 def test_a_hold_may_be_logged_ever_more_slowly() -> None:

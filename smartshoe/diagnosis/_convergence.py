@@ -23,12 +23,12 @@ ROUNDS = 6
 ROUND_STEPS = 6  # of a fit that is linearised again anyway
 
 
-def settled(state: State, progress: Progress, rival: State | None = None) -> State:
+def converged(state: State, progress: Progress, rival: State | None = None) -> State:
     """Fit, linearise and search until the best set is not worth another fit, or a set comes back.
 
     If the sets form a loop, a linearisation promises more than its fit keeps, and the fitted state with most evidence
     is taken. Then each effect's relaxing arm is tried in the place of the baseline's, since it may be the only arm of
-    the unit. ``rival``: a state that has settled before; if this path reaches one of its models the rest would be the
+    the unit. ``rival``: a state that has converged before; if this path reaches one of its models the rest would be the
     same, and ``rival`` is returned.
     """
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
@@ -66,8 +66,8 @@ def _has_as_much_evidence(state: State, other: State) -> bool:
 
 
 def simpler_from(initial: State, state: State, progress: Progress) -> State:
-    """The state that `settled` reaches from ``initial``, if it is simpler than ``state``; else ``state``."""
-    other = settled(initial, progress, state)
+    """The state that `converged` reaches from ``initial``, if it is simpler than ``state``; else ``state``."""
+    other = converged(initial, progress, state)
     return state if other is state else replace(simpler(other, state), path=(*state.path, *other.path))
 
 
@@ -92,7 +92,7 @@ def beyond_bounds(state: State, progress: Progress) -> State:
         odds = state.evidence.odds
         best = min(fits, key=lambda one: with_odds(one.cost, one.model, odds))
         if _is_simpler(best, state):
-            state = settled(state_at(best, state.banned), progress)
+            state = converged(state_at(best, state.banned), progress)
     return state
 
 

@@ -26,7 +26,7 @@ def lines_of(session: Session, faults: Sequence[DataFault]) -> tuple[float, ...]
     return tuple(dict.fromkeys(told))
 
 
-def told_tones(fine: Session, residual: Array, lines_hz: Sequence[float]) -> Array:
+def reported_tones(fine: Session, residual: Array, lines_hz: Sequence[float]) -> Array:
     """(n,) the tones at ``lines_hz`` in a ``residual`` (n,) at the full rate, by least squares of sines and cosines.
 
     They are those of the samples that a fit may use, or of all usable ones where it may use none. A line was told to

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from told_evidence import STANDARD, ToldEvidence, candidate, told_fit, worth
 
-from smartshoe.diagnosis import _settling
+from smartshoe.diagnosis import _convergence
 from smartshoe.diagnosis._state import State
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
@@ -86,12 +86,12 @@ def _ends(
         fits.append(then[len(fits)].fit)
         return fits[-1]
 
-    monkeypatch.setattr(_settling, "_trial_sets", lambda state: [None])
-    monkeypatch.setattr(_settling, "fit_of_set", fitted)
-    monkeypatch.setattr(_settling, "rms_difference", lambda *given: apart)
-    monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
-    monkeypatch.setattr(_settling, "Evidence", weighed)
-    return _settling.settled(first, lambda said: None, known), len(fits)  # type: ignore[arg-type]
+    monkeypatch.setattr(_convergence, "_trial_sets", lambda state: [None])
+    monkeypatch.setattr(_convergence, "fit_of_set", fitted)
+    monkeypatch.setattr(_convergence, "rms_difference", lambda *given: apart)
+    monkeypatch.setattr(_convergence, "state_at", lambda *given: next(coming))
+    monkeypatch.setattr(_convergence, "Evidence", weighed)
+    return _convergence.converged(first, lambda said: None, known), len(fits)  # type: ignore[arg-type]
 
 
 def test_a_set_that_is_found_again_about_another_fit_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,7 +118,7 @@ def test_nothing_is_fitted_for_less_than_the_odds_against_a_name(
 def test_it_ends_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
     ever = [_State("ab"[k % 2] * (k + 1), "c", 500.0) for k in range(20)]
     end, fits = _ends(monkeypatch, _State("", "c", 500.0), ever)
-    assert (end.itself, fits) == (ever[_settling.ROUNDS - 1].itself, _settling.ROUNDS)
+    assert (end.itself, fits) == (ever[_convergence.ROUNDS - 1].itself, _convergence.ROUNDS)
 
 
 @pytest.mark.parametrize("settles", [False, True])
@@ -138,7 +138,7 @@ def test_where_a_search_goes_round_the_fitted_set_with_most_evidence_is_taken(
         noises.append(noise_sd)
         return given.evidence
 
-    monkeypatch.setattr(_settling, "ROUNDS", 2)
+    monkeypatch.setattr(_convergence, "ROUNDS", 2)
     end, fits = _ends(monkeypatch, first, then, weighed=weighed)
     assert (end.fitted, fits, len(end.path)) == ("c" if settles else most, 2, 3)
     assert noises == [0.1, 0.1, 0.05, 0.05]  # of two states the lower
@@ -162,13 +162,13 @@ def test_what_began_anew_is_weighed_once_and_its_way_remembered(monkeypatch: pyt
     state, begun = _State("a", "a", 0.0, (_model("a"),)), _State("", "b", 1.0)
     other = _State("b", "b", 0.0, (_model(""), _model("b")))
     for taken in (state, other):
-        monkeypatch.setattr(_settling, "settled", lambda *given: other)
-        monkeypatch.setattr(_settling, "simpler", lambda one, than, taken=taken: taken)
-        found: Any = _settling.simpler_from(begun, state, lambda said: None)  # type: ignore[arg-type]
+        monkeypatch.setattr(_convergence, "converged", lambda *given: other)
+        monkeypatch.setattr(_convergence, "simpler", lambda one, than, taken=taken: taken)
+        found: Any = _convergence.simpler_from(begun, state, lambda said: None)  # type: ignore[arg-type]
         assert (found.fitted, [one.names for one in found.path]) == (taken.fitted, [("a",), (), ("b",)])
-    monkeypatch.setattr(_settling, "settled", lambda *given: state)
-    monkeypatch.setattr(_settling, "simpler", lambda *given: pytest.fail("there is nothing to weigh"))
-    assert _settling.simpler_from(begun, state, lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
+    monkeypatch.setattr(_convergence, "converged", lambda *given: state)
+    monkeypatch.setattr(_convergence, "simpler", lambda *given: pytest.fail("there is nothing to weigh"))
+    assert _convergence.simpler_from(begun, state, lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
 
 
 # -- of several which -------------------------------------------------------------------------------------------------
@@ -193,8 +193,8 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
     )
     bound = STANDARD.alike * STANDARD.imperfection
     for by, told in ((0.999, near), (1.0, far), (1.001, far)):
-        monkeypatch.setattr(_settling, "rms_difference", lambda *given, by=by: by * bound)
-        assert _settling._is_simpler(new, state) is told
+        monkeypatch.setattr(_convergence, "rms_difference", lambda *given, by=by: by * bound)
+        assert _convergence._is_simpler(new, state) is told
 
 
 @pytest.mark.parametrize(
@@ -213,16 +213,18 @@ def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
     lawful: Any = SimpleNamespace(fit=law)
     for by, told in ((0.999, near), (1.001, far)):
         left = {law.model.names: np.hypot(0.01, by * STANDARD.tolerable), ("c",): 0.01}
-        monkeypatch.setattr(_settling, "error_of", lambda sessions, model, left=left: left[model.names])
+        monkeypatch.setattr(_convergence, "error_of", lambda sessions, model, left=left: left[model.names])
         for has, is_law in zip((True, False), told, strict=True):
-            monkeypatch.setattr(_settling, "_has_as_much_evidence", lambda *of, has=has: has == (of == (lawful, state)))
-            assert (_settling.law_or_block(lawful, state) is lawful) is is_law
+            monkeypatch.setattr(
+                _convergence, "_has_as_much_evidence", lambda *of, has=has: has == (of == (lawful, state))
+            )
+            assert (_convergence.law_or_block(lawful, state) is lawful) is is_law
 
 
 def test_evidence_is_weighed_under_the_lower_of_two_noises(monkeypatch: pytest.MonkeyPatch) -> None:
     scores = {("law", 2.0): 9.0, ("block", 2.0): 7.0, ("law", 3.0): 5.0, ("block", 3.0): 7.0}
     monkeypatch.setattr(
-        _settling,
+        _convergence,
         "Evidence",
         lambda given, sd: SimpleNamespace(
             posterior=lambda start: SimpleNamespace(score=scores[given, sd] + len(start))
@@ -235,9 +237,9 @@ def test_evidence_is_weighed_under_the_lower_of_two_noises(monkeypatch: pytest.M
         )
 
     for own, others, is_enough in ((2.0, 3.0, False), (3.0, 2.0, False), (3.0, 3.0, True)):
-        assert _settling._has_as_much_evidence(state("law", own), state("block", others)) is is_enough
-    assert _settling._has_as_much_evidence(state("law", 3.0, 3), state("block", 3.0))  # as much is enough
-    assert not _settling._has_as_much_evidence(state("law", 3.0, 4), state("block", 3.0))
+        assert _convergence._has_as_much_evidence(state("law", own), state("block", others)) is is_enough
+    assert _convergence._has_as_much_evidence(state("law", 3.0, 3), state("block", 3.0))  # as much is enough
+    assert not _convergence._has_as_much_evidence(state("law", 3.0, 4), state("block", 3.0))
 
 
 def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
@@ -256,22 +258,22 @@ def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
         evidence=evidence,
         banned=("gone",),
     )
-    assert [found if found == "best" else found.members for found in _settling._trial_sets(state)] == [
+    assert [found if found == "best" else found.members for found in _convergence._trial_sets(state)] == [
         "best", (0, 1), (0, 2), (0, 4),
     ]  # fmt: skip
     state.exceeds_linear_range = False
-    assert _settling._trial_sets(state) == ["best"]
+    assert _convergence._trial_sets(state) == ["best"]
     state.exceeds_linear_range, state.fitted_members = True, tuple(range(7))
-    assert _settling._trial_sets(state) == ["best"]
+    assert _convergence._trial_sets(state) == ["best"]
     state.fitted_members = (0, 1, 2, 3, 5, 8)
-    assert len(_settling._trial_sets(state)) > 1
+    assert len(_convergence._trial_sets(state)) > 1
 
 
 def test_strengths_are_parameters_that_are_null_where_the_effect_is_not_there() -> None:
     model = MODEL.with_part("dead_band").with_part("sensor_nonlinearity")
     expected = sum(p.null is not None for name in model.names for p in effect(name).parameters)
-    assert _settling._strengths(model) == expected
-    assert _settling._strengths(MODEL) == 0
+    assert _convergence._strengths(model) == expected
+    assert _convergence._strengths(MODEL) == 0
 
 
 @pytest.mark.parametrize(
@@ -296,15 +298,15 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
             evidence=SimpleNamespace(odds=10.0), thresholds=STANDARD, banned=("z",), likelihood=lambda: "likelihood",
         )  # fmt: skip
 
-    monkeypatch.setattr(_settling, "_trial_sets", lambda state: sorted(evidence))
-    monkeypatch.setattr(_settling, "_strengths", lambda model: counts[model])
+    monkeypatch.setattr(_convergence, "_trial_sets", lambda state: sorted(evidence))
+    monkeypatch.setattr(_convergence, "_strengths", lambda model: counts[model])
     monkeypatch.setattr(
-        _settling,
+        _convergence,
         "fit_of_set",
         lambda _, model, __, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps),
     )
     monkeypatch.setattr(
-        _settling,
+        _convergence,
         "evidence_about",
         lambda model, *rest: (SimpleNamespace(linearisation=f"about {model}"), SimpleNamespace(score=evidence[model])),
     )
@@ -314,9 +316,9 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
         taken.append((found.model, found.steps, banned, given))
         return state("next", 0.0)
 
-    monkeypatch.setattr(_settling, "state_at", stated)
-    monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
-    monkeypatch.setattr(_settling, "_has_as_much_evidence", lambda state, other: True)
+    monkeypatch.setattr(_convergence, "state_at", stated)
+    monkeypatch.setattr(_convergence, "replace", lambda one, **given: one)
+    monkeypatch.setattr(_convergence, "_has_as_much_evidence", lambda state, other: True)
     said: list[str] = []
-    assert _settling.settled(state("first", 50.0), said.append).name == "next"  # type: ignore[attr-defined]
+    assert _convergence.converged(state("first", 50.0), said.append).name == "next"  # type: ignore[attr-defined]
     assert (taken, said) == ([(chosen, 6, ("z",), f"about {chosen}")], ["fitting a, b c"])

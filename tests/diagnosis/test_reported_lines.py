@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Diagnosis
 from smartshoe.diagnosis._averaging import smoothed, thinning_weights
-from smartshoe.diagnosis._told_lines import as_thinned, lines_of, told_tones
+from smartshoe.diagnosis._reported_lines import as_thinned, lines_of, reported_tones
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def test_a_tone_is_found_where_it_is_though_it_was_told_a_bin_beside(hz: float, 
     size = 6000
     tone = 0.3 * _tone(size, hz)
     noisy = tone + 0.01 * np.random.default_rng(1).standard_normal(size)
-    found = told_tones(_session(size), noisy, [hz + off_in_bins / (0.01 * size)])
+    found = reported_tones(_session(size), noisy, [hz + off_in_bins / (0.01 * size)])
     assert np.sqrt(np.mean((found - tone) ** 2)) < 0.001
 
 
@@ -52,15 +52,15 @@ def test_it_is_that_of_the_samples_that_a_fit_may_use() -> None:
     session = _session(size, lost=slice(4000, 4100), held=held)
     heard[4000:4100] = 1e3
     other[4000:4100] = -1e3
-    found, found_in_other = (told_tones(session, one, [12.34]) for one in (heard, other))
+    found, found_in_other = (reported_tones(session, one, [12.34]) for one in (heard, other))
     np.testing.assert_array_equal(found, found_in_other)
     assert np.sqrt(np.mean((found - tone) ** 2)) < 0.001
 
 
 def test_of_a_recording_that_only_judges_all_usable_samples_count_and_of_none_nothing() -> None:
     tone = _tone(3000, 12.34)
-    np.testing.assert_allclose(told_tones(_session(3000, held=slice(None)), tone, [12.34]), tone, atol=1e-3)
-    assert not told_tones(_session(3000, lost=slice(None)), tone, [12.34]).any()
+    np.testing.assert_allclose(reported_tones(_session(3000, held=slice(None)), tone, [12.34]), tone, atol=1e-3)
+    assert not reported_tones(_session(3000, lost=slice(None)), tone, [12.34]).any()
 
 
 def test_what_is_no_line_that_was_told_stays() -> None:
@@ -70,13 +70,13 @@ def test_what_is_no_line_that_was_told_stays() -> None:
     wave = 0.02 * np.sign(np.sin(2.0 * np.pi * 0.11 * at_s)) + 0.02 * _tone(size, 19.0)
     noise = 0.01 * rng.standard_normal(size)
     left = wave + noise + 0.1 * _tone(size, 23.4)
-    found = told_tones(_session(size), left, [23.4])
+    found = reported_tones(_session(size), left, [23.4])
     np.testing.assert_allclose(left - found, wave + noise, atol=1e-3)
 
 
 def test_two_lines_are_both_taken_the_strongest_first() -> None:
     tones = _tone(6000, 12.5) + 0.2 * _tone(6000, 40.0)
-    np.testing.assert_allclose(told_tones(_session(6000), tones, [12.5, 40.0]), tones, atol=2e-3)
+    np.testing.assert_allclose(reported_tones(_session(6000), tones, [12.5, 40.0]), tones, atol=2e-3)
 
 
 @pytest.mark.parametrize("factor", [1, 4, 10])
