@@ -15,11 +15,12 @@ from smartshoe.integrity.thresholds import Thresholds
 def limit_integral(sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
     """The sentence on fitted readings that move with the load's integral far more (``clear``) than with the load.
 
-    Both are fitted together, by one gain each, beside a line in time for each session. What creeps, leaks or warms
-    moves far less with the integral.
+    Both are fitted together, by one gain each, beside a line in time for each session, and explain most of the
+    readings' variance. What creeps, leaks or warms moves far less with the integral, and of what is late by a quarter
+    of a period the two explain little, unless the load is all but one sine.
     """
     of_load, of_integral, explained = _shares(sessions)
-    if of_integral <= thresholds.clear * of_load:
+    if of_integral <= thresholds.clear * of_load or thresholds.clear * explained < 1.0:
         return []
     return [
         f"the reading goes with what the load adds up to (its integral) by {percent(of_integral)} of full scale, rms,"

@@ -83,7 +83,8 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         limit_slow_segments(one.recording, mask, longest_step_s(one.recording, one.thinned), thresholds)
         for one, mask in zip(sessions, clocks.usable, strict=True)
     )
-    integral = limit_integral(sessions, thresholds)
+    # By edges that are late it is known that the reading is the load of another time, and no integral.
+    integral = [] if clocks.parts else limit_integral(sessions, thresholds)
     limits = [
         *said_of_neighbours,
         *clocks.says,

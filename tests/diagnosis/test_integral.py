@@ -60,6 +60,19 @@ def test_what_creeps_falls_or_lags_within_a_cycle_is_no_integral(share: float, s
     assert not limit_integral([session_under(load, reading)], STANDARD)
 
 
+@pytest.mark.parametrize("late_s", [0.1, 0.25, 0.4, 0.8])
+def test_steps_that_are_late_by_a_quarter_of_a_stride_are_no_integral(late_s: float) -> None:
+    """A walk of 28 s after and before a rest: its fundamental is late by a quarter of a period, the walk is not."""
+
+    def walk(at_s: Array) -> Array:
+        stride = at_s % 1.1 / 1.1
+        step = np.where(stride < 0.6, np.sin(np.pi * stride / 0.6), 0.0)
+        return np.asarray(step * (at_s > 2.0) * (at_s < 30.0))
+
+    time_s = np.arange(0.0, 32.0, 0.01)
+    assert not limit_integral([session_under(walk(time_s), walk(time_s - late_s))], STANDARD)
+
+
 @pytest.mark.parametrize("name", OTHER_SENSORS)
 def test_no_sensor_of_a_load_is_its_integral(name: str) -> None:
     fitted = OTHER_SENSORS[name].recordings(0)[0]

@@ -56,6 +56,12 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     # A reading that is moved by itself matters where it is fitted.
     for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
         assert prepared(runs, count, integrity(*lags), STANDARD).is_moved is is_moved
+    # What the load adds up to is no unit's either, but for a reading whose edges are late.
+    added_up = np.cumsum(LOAD - LOAD.mean())
+    integrals = [replace_reading(one, 140.0 * added_up / np.ptp(added_up)) for one in runs]
+    assert prepared(integrals, 3, with_lag(0.0), STANDARD).is_integral
+    assert not prepared(integrals, 3, with_lag(0.3), STANDARD).is_integral
+    assert not within.is_integral
     # Friction in each recording is no unit's; in one of them it is said.
     lasting_memory = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
     assert prepared(lasting_memory, 3, with_lag(0.0), STANDARD).is_no_unit
