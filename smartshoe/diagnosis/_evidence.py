@@ -276,7 +276,7 @@ class Evidence:
         return self.posterior(members).score - float(sum(free))
 
     def score_gains_with_steps(self, members: Members, steps: Sequence[StepColumns]) -> Array:
-        """(steps,) by how much a set's score falls when each of the sessions' ``steps``, of unit prior, joins the nuisances."""
+        """(steps,) by how much a set's score falls when each of the ``steps``, of unit prior, joins the nuisances."""
         on_nuisances = [one.products(own) for one, own in zip(steps, self.linearisation.fitted_nuisances, strict=True)]
         cross = self._with_steps(self._all_columns, steps, on_nuisances)
         half = self._half_solved(cross)
