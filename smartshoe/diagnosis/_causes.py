@@ -38,7 +38,7 @@ def cause_of(
     gained = gain(errors(fine, without), best, scale, thresholds)
     rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
-        _likelihood_ratio(name),
+        _evidence_against_nothing(name),
         *_held_out_evidence(member.size, gained, thresholds.material),
         *_nearest_rival(rivals, name.equivalents),
         *_how_sure(name, law, rivals, found, thresholds),
@@ -61,7 +61,7 @@ def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
     return tuple(one for one in sorted(near.values(), key=lambda one: one.margin) if one.effect in catalogue())
 
 
-def _likelihood_ratio(name: Name) -> Statement:
+def _evidence_against_nothing(name: Name) -> Statement:
     """How much less probable the data is without the effect."""
     nothing = next((a.margin for a in name.member.alternatives if a.effect is None), 0.0)
     says = f"less likely by {nothing:,.0f} (-2 log likelihood, 10 is strong evidence), though other effects may take"

@@ -275,8 +275,8 @@ class Evidence:
         free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
         return self.posterior(members).score - float(sum(free))
 
-    def score_gains_with_steps(self, members: Members, steps: Sequence[StepColumns]) -> Array:
-        """(steps,) by how much a set's score falls when each of the ``steps``, of unit prior, joins the nuisances."""
+    def bayes_factors_of_steps(self, members: Members, steps: Sequence[StepColumns]) -> Array:
+        """(steps,) twice the log Bayes factor of each of the ``steps``, of unit prior, as a nuisance beside a set."""
         on_nuisances = [one.products(own) for one, own in zip(steps, self.linearisation.fitted_nuisances, strict=True)]
         cross = self._with_steps(self._all_columns, steps, on_nuisances)
         half = self._half_solved(cross)

@@ -206,22 +206,22 @@ def with_changes(state: State, with_own: _OwnTerms, *, of_zero: bool = False) ->
     steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
     none = [replace(one, starts=one.starts[:0]) for one in steps]
     for _ in range(MOST_CHANGES * len(fitted)):
-        falls = with_own.evidence.score_gains_with_steps(with_own.members, steps)
+        factors = with_own.evidence.bayes_factors_of_steps(with_own.members, steps)
         each = zip(fitted_of(with_own.sessions), moments, strict=True)
-        falls[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
-        while falls.max() >= with_own.odds_of_a_change:
-            best = int(np.argmax(falls))
+        factors[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
+        while factors.max() >= with_own.odds_of_a_change:
+            best = int(np.argmax(factors))
             k = int(np.searchsorted(ends, best, side="right"))
             one, j = fitted_of(with_own.sessions)[k], best - int(ends[k]) + moments[k].size
             # Refined between the neighbouring moments, so that one change is not found as two around it.
             around = np.arange(*(one.reading.size * beside // (moments[k].size + 1) for beside in (j, j + 2)))[1:]
             around = around[_may_change(one, around)]
             alone = [*none[:k], StepColumns.of(one, moved[k], around), *none[k + 1 :]]
-            at = int(around[np.argmax(with_own.evidence.score_gains_with_steps(with_own.members, alone))])
+            at = int(around[np.argmax(with_own.evidence.bayes_factors_of_steps(with_own.members, alone))])
             changed = _changed(one, at, zero_sd)
             if not of_zero or may_jump(changed, at, state.fit.model, rounded[k], state.thresholds):
                 break
-            falls[best] = -math.inf  # it may become a candidate again beside other changes
+            factors[best] = -math.inf  # it may become a candidate again beside other changes
         else:
             break
         sessions = [changed if other is one else other for other in with_own.sessions]

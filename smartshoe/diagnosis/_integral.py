@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smartshoe.arrays import Array
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.display import percent
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.signals.lags import left_by
 
 
 def limit_integral(sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
@@ -37,16 +37,11 @@ def _shares(sessions: Sequence[Session]) -> tuple[float, float, float]:
     for one in fitted_of(sessions):
         load, mask = one.conditions.load, one.fitted
         integral = np.cumsum(load - np.mean(load)) * one.conditions.step_s
-        columns = _beside_lines(np.column_stack([load, integral, one.reading])[mask], one.conditions.time_s[mask])
+        lines = np.column_stack([np.ones(load.size), one.conditions.time_s])[mask]
+        columns = left_by(lines, np.column_stack([load, integral, one.reading])[mask])
         inner = columns.T @ columns
         products, target, total = products + inner[:2, :2], target + inner[:2, 2], total + float(inner[2, 2])
         count += int(np.count_nonzero(mask))
     gains = np.linalg.lstsq(products, target, rcond=None)[0]
     of_load, of_integral = np.abs(gains) * np.sqrt(np.diag(products) / max(count, 1))
     return float(of_load), float(of_integral), float(gains @ target) / max(total, 1e-300)
-
-
-def _beside_lines(columns: Array, time_s: Array) -> Array:
-    """Columns (n, m) without their means and their trends over ``time_s`` (n,)."""
-    lines = np.column_stack([np.ones(time_s.size), time_s - np.mean(time_s)])
-    return np.asarray(columns - lines @ np.linalg.lstsq(lines, columns, rcond=None)[0])

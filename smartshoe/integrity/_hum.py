@@ -1,6 +1,6 @@
 """Hum: spectral lines in the reading at any frequency, true or folded by sampling, looked for where the load rests.
 
-A slow polynomial is taken off the reading in each stretch of rest. A line is a peak of the spectrum that noise would
+A slow polynomial is taken off the reading in each segment of rest. A line is a peak of the spectrum that noise would
 not reach. It must be of one phase, and last: a ringing begins anew with each move of the load and dies.
 """
 
@@ -66,16 +66,16 @@ def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
     """
     if view.span == 0.0:
         return []
-    stretches = _quiet_segments(view)
-    size = sum(last - first for first, last in stretches)
+    segments = _quiet_segments(view)
+    size = sum(last - first for first, last in segments)
     if size < 128:
         return []
-    residual, weight = _residual(view, bad, stretches)
-    longest = max(last - first for first, last in stretches)
+    residual, weight = _residual(view, bad, segments)
+    longest = max(last - first for first, last in segments)
     resolved_hz = view.thresholds.clear / (longest * view.step_s)  # half the main lobe of a Hann window
     found: list[tuple[float, float]] = []
     for _ in range(view.thresholds.few):
-        line = _strongest(view, residual, weight, stretches)
+        line = _strongest(view, residual, weight, segments)
         if line is None:
             break
         if all(abs(line[0] - frequency_hz) > resolved_hz for frequency_hz, _ in found):
@@ -87,7 +87,7 @@ def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
 def _quiet_segments(view: View) -> list[tuple[int, int]]:
     """Stretches of rest, (first, past last) sample: a few blocks or more in which the load's block means stand still.
 
-    A block is as long as a sensor's lag. The first block of each stretch is left out, since the reading may still
+    A block is as long as a sensor's lag. The first block of each segment is left out, since the reading may still
     follow the move before it.
     """
     n, given = view.load.values.size, view.thresholds
@@ -110,15 +110,15 @@ def _quiet_segments(view: View) -> list[tuple[int, int]]:
     return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a > given.few]
 
 
-def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[Array, Array]:
-    """(m,) each: the reading less a fifth-degree polynomial in each stretch, under a Hann window; and that window.
+def _residual(view: View, bad: Mask, segments: list[tuple[int, int]]) -> tuple[Array, Array]:
+    """(m,) each: the reading less a fifth-degree polynomial in each segment, under a Hann window; and that window.
 
     Both are 0 elsewhere, and at samples that are ``bad`` (m,) or far off.
     """
     y = view.reading.values
     limit = view.reading.largest * view.reading.noise + view.thresholds.clear * view.reading.step
     residual, weight = np.zeros(y.size), np.zeros(y.size)
-    for first, last in stretches:
+    for first, last in segments:
         x = np.linspace(-1.0, 1.0, last - first)
         basis = np.polynomial.legendre.legvander(x, 5)
         reading, is_good = y[first:last], ~bad[first:last]
@@ -136,7 +136,7 @@ def _lasts(whole: float, by_part: Array, weight: Array, noise_power: Array, thre
     """Whether a line has one phase and one power in all parts, as a hum has and a ringing has not.
 
     ``whole``: the line's amplitude over all parts. ``by_part`` (p,): of each part, the first and the second half of a
-    stretch in turn. ``weight`` (p,): how much each part counts. ``noise_power`` (p,): what noise adds to the square of
+    segment in turn. ``weight`` (p,): how much each part counts. ``noise_power`` (p,): what noise adds to the square of
     each amplitude.
     """
     share = weight**2
@@ -150,14 +150,14 @@ def _lasts(whole: float, by_part: Array, weight: Array, noise_power: Array, thre
 
 
 def _strongest(
-    view: View, residual: Array, weight: Array, stretches: list[tuple[int, int]]
+    view: View, residual: Array, weight: Array, segments: list[tuple[int, int]]
 ) -> tuple[float, float, Array] | None:
     """Frequency in Hz, amplitude and waveform (m,) of the strongest line that passes every test, or None.
 
     1. Noise would not reach its power (`_peak_of_spectrum`).
     2. From peak to peak it is material, and larger than the toggling of a silent signal between two levels.
-    3. It is as strong in the second halves of the stretches as in the first ones, where a ringing has died.
-    4. It has one phase over all stretches, though mains wander a little.
+    3. It is as strong in the second halves of the segments as in the first ones, where a ringing has died.
+    4. It has one phase over all segments, though mains wander a little.
     5. It lies on a harmonic of the mains, or it lasts (`_lasts`).
     """
     given = view.thresholds
@@ -171,7 +171,7 @@ def _strongest(
     by_part, halves = [], np.zeros(2)
     weights, noise_power = [], []
     level = fold**2 * background / float(np.dot(weight, weight))
-    for low, high in stretches:
+    for low, high in segments:
         middle = (low + high) // 2
         for i, (a, b) in enumerate(pairwise((low, middle, high))):
             total = float(weight[a:b].sum())

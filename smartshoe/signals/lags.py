@@ -24,6 +24,6 @@ def share_regressors(share: Array, step_s: float, time_constants_s: Sequence[flo
 
 
 def left_by(columns: Array, values: Array) -> Array:
-    """(n,) what the least-squares fit of ``columns`` (n, k), of any scales, leaves of ``values`` (n,)."""
+    """What the least-squares fit of ``columns`` (n, k), of any scales, leaves of ``values``, (n,) or several (n, m)."""
     scaled = columns / np.maximum(np.abs(columns).max(axis=0), 1e-300)
     return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])

@@ -365,7 +365,7 @@ def test_a_zero_that_changes_costs_what_its_prior_asks() -> None:
         StepColumns.of(one, np.full(one.reading.size, sd), own) for one, own in zip(sessions, moments, strict=True)
     ]
     changed = replace(given, sessions=(replace(sessions[0], zero_changes=(at,), zero_sd=sd), sessions[1]))
-    (fall,) = Evidence(given, SD).score_gains_with_steps((), steps)
+    (fall,) = Evidence(given, SD).bayes_factors_of_steps((), steps)
     before, after = (Evidence(one, SD).comparable_score(()) for one in (given, changed))
     assert fall == pytest.approx(before - after, abs=0.01)
 
@@ -393,7 +393,7 @@ def test_what_a_step_takes_off_a_score_is_what_the_score_with_it_says(is_changed
     steps = [StepColumns.of(one, own, np.array([at])) for one, own in zip(gained, by, strict=True)]
     changed = replace(given, sessions=(replace(gained[0], gain_changes=(at,)), gained[1]))
     for members in ((), (curve,)):
-        fall, _ = Evidence(given, SD).score_gains_with_steps(members, steps)
+        fall, _ = Evidence(given, SD).bayes_factors_of_steps(members, steps)
         before, after = (Evidence(one, SD).comparable_score(members) for one in (given, changed))
         assert fall == pytest.approx(before - after, abs=2.0 + 0.05 * abs(fall))
         assert bool(fall > 20.0) is is_changed
@@ -403,7 +403,7 @@ def test_of_many_recordings_no_changes_are_asked_for(monkeypatch: pytest.MonkeyP
     """A column for each moment of each recording would be too many."""
     sessions = _sessions(*(_run(k, 0.0) for k in range(13)))
     state = _state(CURVED, sessions)
-    monkeypatch.setattr(Evidence, "score_gains_with_steps", lambda *given: pytest.fail("asked for"))
+    monkeypatch.setattr(Evidence, "bayes_factors_of_steps", lambda *given: pytest.fail("asked for"))
     gained = _OwnTerms.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions], SD)
     assert with_changes(state, gained) is gained
 

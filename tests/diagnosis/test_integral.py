@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import lfilter
+from test_diagnosis_parts import sessions_of
 from told_columns import session_under, some_load
 
 from simulators.other_sensors import OTHER_SENSORS
@@ -14,16 +14,10 @@ from smartshoe import Recording, diagnose
 from smartshoe.arrays import Array
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._integral import limit_integral
-from smartshoe.diagnosis._scale import full_scale, thinning
-from smartshoe.diagnosis._session import prepare
+from smartshoe.signals.lags import lagged
 
 STANDARD = Thresholds()
 SIZE = 600
-
-
-def _late(load: Array, samples: float) -> Array:
-    keep = float(np.exp(-1.0 / samples))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], load, zi=[keep * load[0]])[0])
 
 
 @given(
@@ -56,7 +50,7 @@ def test_the_larger_share_decides_whatever_offset_and_drift_each_recording_has(
 @pytest.mark.parametrize("share", [-0.5, 0.5, 1.0])
 def test_what_creeps_falls_or_lags_within_a_cycle_is_no_integral(share: float, samples: float) -> None:
     load = some_load(SIZE, 7)  # 20 points on 600 samples
-    reading = load + share * _late(load, samples)
+    reading = load + share * lagged(load, 1.0, samples)
     assert not limit_integral([session_under(load, reading)], STANDARD)
 
 
@@ -75,11 +69,8 @@ def test_steps_that_are_late_by_a_quarter_of_a_stride_are_no_integral(late_s: fl
 
 @pytest.mark.parametrize("name", OTHER_SENSORS)
 def test_no_sensor_of_a_load_is_its_integral(name: str) -> None:
-    fitted = OTHER_SENSORS[name].recordings(0)[0]
-    usable = [np.ones(len(one), dtype=bool) for one in fitted]
-    scale = full_scale(fitted, usable, STANDARD)
-    sessions = prepare(fitted, usable, None, scale, thinning(fitted, scale, STANDARD), STANDARD)
-    assert not limit_integral(sessions, STANDARD)
+    fitted, _ = OTHER_SENSORS[name].recordings(0)
+    assert not limit_integral(sessions_of(*fitted)[0], STANDARD)
 
 
 def _damper(friction_n: float, viscous: float, spring: float, seed: int) -> Recording:

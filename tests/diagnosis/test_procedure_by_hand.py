@@ -15,8 +15,8 @@ from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
 from smartshoe.diagnosis._causes import (
     _beside_kin,
+    _evidence_against_nothing,
     _held_out_evidence,
-    _likelihood_ratio,
     _nearest_rival,
     cause_of,
     zero_cause_of,
@@ -365,7 +365,7 @@ def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monke
 
 def test_a_cause_without_which_the_data_is_no_less_likely_is_said_to_be_so() -> None:
     name: Any = SimpleNamespace(member=SimpleNamespace(alternatives=(SimpleNamespace(effect=None, margin=-12.0),)))
-    fall = _likelihood_ratio(name)
+    fall = _evidence_against_nothing(name)
     assert fall.value == -12.0
     assert fall.says == (
         "without it, with all else fitted again, the data is no less likely (-2 log likelihood falls by 12), since"
