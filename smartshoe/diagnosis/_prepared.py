@@ -98,20 +98,18 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     seen = [one for one in zeros_of(sessions, start, scale, 0.0, 0.0, thresholds) if one.is_seen]
     if tares := [one.effect.of_at_most(one.value) for one in seen if one.effect.shifts == "load"]:
         sessions = [replace(one, tare=tares[0]) for one in sessions]
-    fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
-    is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     return Prepared(
-        sessions,
-        fine,
-        scale,
-        limits,
-        start,
-        excitation,
-        is_no_unit,
-        bool(integral),
-        clocks.parts,
-        is_moved,
-        thresholds,
+        sessions=sessions,
+        fine=at_full_rate(sessions, clocks.usable, scale, thresholds),
+        scale=scale,
+        limits=limits,
+        start=start,
+        excitation=excitation,
+        is_no_unit=ranges.is_trap or all(said is not None for said in friction),
+        is_integral=bool(integral),
+        clocks=clocks.parts,
+        is_moved=is_moved,
+        thresholds=thresholds,
     )
 
 
