@@ -98,7 +98,9 @@ def _how_sure(
             else "it is larger than all that is left unexplained, or than small imperfections and errors of other laws"
         )
         doubt = "it may stand for the error of another equation, or for part of another cause"
-        if name.equivalents or likelier_of(rivals, name.equivalents):
+        if name.doubt:
+            doubt = name.doubt
+        elif name.equivalents or likelier_of(rivals, name.equivalents):
             doubt = "other effects do as well"
         says = f"it is not sure, since {doubt}; it is named because {why}"
         return [Statement(OF_A_DOUBTED_CAUSE, name.kind_probability, thresholds.least_confidence, says)]

@@ -13,6 +13,10 @@ from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 
+# Why a name is half sure at most.
+BY_THE_CLOCK = "peak loads grow, or fall, with time, so that what goes with time and what goes with the load are alike"
+BESIDE_A_BENT_CURVE = "it may be what a curve at the end of its range misses"
+
 
 @dataclass(frozen=True, eq=False)
 class Name:
@@ -24,7 +28,8 @@ class Name:
 
     ``kind_only``: only the family was found, since no equation of it follows better than the others. ``is_sure``: the
     kind has at least ``least_confidence``. ``law_in_place`` is the law fitted in the place of a flexible block, which
-    names it although the block stays in the model.
+    names it although the block stays in the model. ``doubt``: why it is half sure at most, where it is for a reason of
+    its own.
     """
 
     member: Member
@@ -35,6 +40,7 @@ class Name:
     kind_only: bool = False
     is_sure: bool = True
     law_in_place: Alternative | None = None
+    doubt: str = ""
 
 
 def names_of(
@@ -43,7 +49,7 @@ def names_of(
     thresholds: Thresholds,
     *,
     is_clocked: bool = False,
-    is_unsure: bool = False,
+    doubt: str = "",
     best_single: Effect | None = None,
     together: Sequence[Member] = (),
 ) -> tuple[Name, ...]:
@@ -60,9 +66,8 @@ def names_of(
 
     ``is_clocked``: peak loads rise or fall with time, so that effects that go with time imitate each other and curves;
     these are half sure at most. So is any memory effect together with a curve at the end of its range, since it may be
-    what that curve misses. ``is_unsure``: all are half sure at most, since zeros jump, and unseen jumps may imitate any
-    effect, or since the reading is the load's integral. Flexible blocks, and curves at the end of their kind, carry the
-    name of the nearest law; no name is given twice.
+    what that curve misses. ``doubt``: why all are half sure at most, empty where they may be sure. Flexible blocks, and
+    curves at the end of their kind, carry the name of the nearest law; no name is given twice.
     """
     named = [_named(one, residual_rms, thresholds) for one in members if one.size >= thresholds.material]
     for joint in (_named(one, residual_rms, thresholds) for one in together):
@@ -71,14 +76,12 @@ def names_of(
             named = [*(one for one in named if one.member.name not in kin), _with_kin(joint)]
     named = [_with_confounded(name, thresholds) for name in named]
     is_bent = any(one.bends_too_little for one in members)
-    named = [
-        capped_at_half(name)
-        if is_unsure
-        or (is_clocked and name.effect.goes_with_the_clock)
-        or (is_bent and not name.member.effect.is_memoryless)
-        else name
-        for name in named
-    ]
+    if doubt:
+        named = [capped_at_half(name, doubt) for name in named]
+    if is_clocked:
+        named = [capped_at_half(one, BY_THE_CLOCK) if one.effect.goes_with_the_clock else one for one in named]
+    if is_bent:
+        named = [one if one.member.effect.is_memoryless else capped_at_half(one, BESIDE_A_BENT_CURVE) for one in named]
     # A block named after a law that is in the model itself is only that law's departure: one name.
     first: dict[str, Name] = {}
     for one in sorted(named, key=lambda one: (one.is_sure, one.member.size), reverse=True):
@@ -182,9 +185,9 @@ def _nearest_of_kind(block: Member) -> Effect:
     return min(alike or family, key=lambda e: margins.get(e.name, math.inf))
 
 
-def capped_at_half(name: Name) -> Name:
-    """The name with a probability of one half at most, and not sure."""
-    return replace(name, kind_probability=min(name.kind_probability, 0.5), is_sure=False)
+def capped_at_half(name: Name, doubt: str = "") -> Name:
+    """The name with a probability of one half at most, and not sure; the first ``doubt`` is kept."""
+    return replace(name, kind_probability=min(name.kind_probability, 0.5), is_sure=False, doubt=name.doubt or doubt)
 
 
 def probability_of_kind(one: Member, residual_rms: float, thresholds: Thresholds) -> float:

@@ -28,6 +28,12 @@ from smartshoe.diagnosis._remembered import may_be_remembered
 from smartshoe.diagnosis._zero import Zero, creeping_tare
 from smartshoe.models.effects import told_apart_by
 
+# Why names are half sure at most.
+JUMPS = "the zero jumps within recordings, and jumps that are not seen may look like any effect"
+AN_INTEGRAL = "the reading goes with the integral of the load, as no pressed unit's does"
+UNDONE = "other effects of the model undo a part of it"
+REMEMBERED = "it may be a memory of loads before the recordings"
+
 
 @dataclass(frozen=True, eq=False)
 class NamedCauses:
@@ -102,7 +108,7 @@ def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepa
     """``chosen`` with those drifts half sure at most that may be a memory of loads before the recordings."""
     about = found.fit.model, given.sessions, given.thresholds
     unsure = [one for one in chosen.names if may_be_remembered(one, *about)]
-    names = tuple(capped_at_half(one) if one in unsure else one for one in chosen.names)
+    names = tuple(capped_at_half(one, REMEMBERED) if one in unsure else one for one in chosen.names)
     return replace(chosen, names=names, limits=(*chosen.limits, *limit_remembered(unsure)))
 
 
@@ -122,7 +128,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
             residual_rms,
             thresholds,
             is_clocked=given.excitation.goes_with_the_clock,
-            is_unsure=bool(found.zero_changes) or given.is_integral,
+            doubt=JUMPS if found.zero_changes else AN_INTEGRAL if given.is_integral else "",
             best_single=found.best_single,
             together=[one for one in found.together if {one.name, *one.kin} <= left],
         )
@@ -133,9 +139,7 @@ def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCause
                 for one in found.members
                 if one.name in found.cancelling_names and one.effect.kind == found.best_single.kind
             ]
-            names = names_of(
-                cancelling_members, residual_rms, thresholds, is_unsure=True, best_single=found.best_single
-            )
+            names = names_of(cancelling_members, residual_rms, thresholds, doubt=UNDONE, best_single=found.best_single)
         shown = NamedCauses(names, (), limits).without(
             lambda one: (
                 reason_of_another_kind(one, found.fit.model, thresholds)

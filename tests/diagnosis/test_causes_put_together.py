@@ -10,6 +10,7 @@ from told_diagnosis import name_of, run_diagnosis
 
 from smartshoe.diagnosis import _withheld
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
+from smartshoe.diagnosis._withheld import AN_INTEGRAL, JUMPS, UNDONE
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.models.effects import effect, shift_of
 
@@ -35,7 +36,7 @@ def test_a_cause_is_withheld_where_the_limits_say_why(parts: Any, why: dict[str,
     assert parts.seen["sentence_of"][1]["withheld"] is is_withheld
 
 
-@pytest.mark.parametrize(("jumps", "is_integral"), [(False, False), (True, False), (False, True)])
+@pytest.mark.parametrize(("jumps", "is_integral"), [(False, False), (True, False), (False, True), (True, True)])
 def test_names_know_what_makes_them_unsure(jumps: bool, is_integral: bool, parts: Any) -> None:
     for is_clocked in (True, False):
         parts.seen.clear()
@@ -45,7 +46,7 @@ def test_names_know_what_makes_them_unsure(jumps: bool, is_integral: bool, parts
         run_diagnosis(parts)
         assert parts.seen["names_of"][1] == {
             "is_clocked": is_clocked,
-            "is_unsure": jumps or is_integral,
+            "doubt": JUMPS if jumps else AN_INTEGRAL if is_integral else "",
             "best_single": None,
             "together": [],
         }
@@ -164,4 +165,4 @@ def test_what_does_most_by_itself_is_named_though_others_undo_it(parts: Any, mon
     assert [one.name for one in told.causes] == ["linear_leak"]
     (first, _), (second, how) = asked
     assert (first, second) == ([], ["second_relaxation", "second_relaxation"])  # of the kind of what does most alone
-    assert (how["is_unsure"], how["best_single"]) == (True, parts.found.best_single)
+    assert (how["doubt"], how["best_single"]) == (UNDONE, parts.found.best_single)

@@ -46,7 +46,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
     assert seen["names_of"][1] == {
-        "is_clocked": False, "is_unsure": False, "best_single": None, "together": [],
+        "is_clocked": False, "doubt": "", "best_single": None, "together": [],
     }  # fmt: skip
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert seen["zeros_of"][0][6] == ("wanders", STANDARD.hold_s)

@@ -19,6 +19,7 @@ from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._limits import limit_curve_range
 from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.diagnosis._naming import (
+    BY_THE_CLOCK,
     Name,
     _other_laws_of_family,
     confidence_of,
@@ -335,9 +336,14 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
 def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
     sure = member("play_hysteresis", size=0.05)
     assert only(names_of([sure], 0.0, STANDARD)).kind_probability > 0.5
-    (told,) = names_of([sure], 0.0, STANDARD, is_unsure=True)  # larger than what is left, and not to be ruled out
-    assert (told.kind_probability, told.is_sure) == (0.5, False)
-    assert not names_of([member(size=0.05, departure_sds=9.0)], 0.06, STANDARD, is_unsure=True)
+    (told,) = names_of([sure], 0.0, STANDARD, doubt="zeros jump")  # larger than what is left, and not to be ruled out
+    assert (told.kind_probability, told.is_sure, told.doubt) == (0.5, False, "zeros jump")
+    # Of several reasons the first is said.
+    drift = member("zero_drift", size=0.05)
+    for doubt in ("zeros jump", ""):
+        (told,) = names_of([drift], 0.0, STANDARD, doubt=doubt, is_clocked=True)
+        assert told.doubt == (doubt or BY_THE_CLOCK)
+    assert not names_of([member(size=0.05, departure_sds=9.0)], 0.06, STANDARD, doubt="zeros jump")
 
 
 def test_where_none_is_sure_those_are_named_that_move_more_than_what_is_left_half_sure_at_most() -> None:

@@ -285,6 +285,7 @@ def _told(
     equivalents: tuple[str, ...] = ("orifice_leak",),
     channels: frozenset[str] = frozenset(),
     is_flexible: bool = True,
+    doubt: str = "",
 ) -> Any:
     asked: list[Any] = []
 
@@ -318,6 +319,7 @@ def _told(
         kind_only=kind_only,
         is_sure=is_sure,
         law_in_place=by,
+        doubt=doubt,
     )
     excitation = Excitation((0.1,), (1.0,), present, STANDARD, channels=channels)
     whole = SimpleNamespace(model="the whole")
@@ -408,6 +410,8 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another
         doubt = _told(monkeypatch, exposed, is_sure=False, alone=effect(alone)).evidence[-1]
         assert doubt.says == (f"{named} by itself it predicts left-out data best" if is_why else size)
+    own = _told(monkeypatch, exposed, is_sure=False, doubt="the zero jumps").evidence[-1]
+    assert own.says == size.replace("other effects do as well", "the zero jumps")
 
 
 def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -108,7 +108,7 @@ def test_what_is_said_of_a_cause_does_not_contradict_itself(
     rivals = tuple(sorted((Rival(*one) for one in margins.items()), key=lambda one: one.margin))
     name: Any = SimpleNamespace(
         effect=LEAK_CAUSE.effect, equivalents=tuple(equivalents), is_sure=is_sure, kind_only=kind_only,
-        kind_probability=0.5, member=SimpleNamespace(fall=100.0),
+        kind_probability=0.5, doubt="",
     )  # fmt: skip
     found: Any = SimpleNamespace(best_single=None if alone is None else effect(alone))
     evidence = tuple(_how_sure(name, None, rivals, found, Thresholds()))
