@@ -76,7 +76,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     excitation = replace(excitation_of(sessions, thresholds), channels=logged_words(sessions))
-    ranges = ranges_of(sessions, scale, thresholds)
+    ranges = ranges_of(sessions, start, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in following]  # a lag would look like friction
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
     slow = (

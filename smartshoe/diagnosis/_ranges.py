@@ -14,6 +14,7 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.display import rounded
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.exposure import LATER_CYCLES, SAYS
+from smartshoe.models.extended import ExtendedModel
 
 GROUPS = 100  # the largest number of groups of similar loads: a resolution
 
@@ -26,15 +27,15 @@ class Ranges:
     is_trap: bool = False
 
 
-def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> Ranges:
-    """A sentence for each thing that the range of the fitted loads does not support."""
+def ranges_of(sessions: Sequence[Session], unit: ExtendedModel, scale: Scale, thresholds: Thresholds) -> Ranges:
+    """A sentence for each thing that the range of the fitted loads does not support; ``unit`` is the baseline."""
     said: list[str] = []
     fitted = [one for one in sessions if _has_enough(one.fitted)]
     if not fitted:
         return Ranges()
     pairs = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
     trap = False
-    unit = scale.unit.symbol
+    symbol = scale.unit.symbol
     to_physical = scale.reading / scale.load_n
     within = [_gain(load, reading, thresholds.follows) for load, reading in pairs]
     gains = [gain for gain in within if gain is not None]
@@ -50,12 +51,12 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
         over_load = (
             "where the mean reading is next to nothing"
             if abs(through_zero) <= thresholds.standing * abs(gain)
-            else f"where reading over load is {_gain_in_words(through_zero * to_physical, unit)}"
+            else f"where reading over load is {_gain_in_words(through_zero * to_physical, symbol)}"
         )
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
             f" {fitted[lowest].recording.name}), in which the reading moves by"
-            f" {_gain_in_words(gain * to_physical, unit)}"
+            f" {_gain_in_words(gain * to_physical, symbol)}"
             + (
                 f", {over_load}: load and reading may both follow a third thing (a reversal, a regulator), so that this"
                 " gain is none to calibrate by, and no cause is named"
@@ -76,7 +77,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     beside = [_gain(one.conditions.load[one.judged], one.reading[one.judged], thresholds.follows) for one in judged]
     named = [one.recording.name for one in (*fitted, *judged)]
     said += _limit_foreign_gain(list(zip(named, (*within, *beside), strict=True)), thresholds)
-    said += _limit_unlike_gain(fitted, thresholds)
+    said += _limit_unlike_gain(fitted, unit, thresholds)
     between = _gain_between_files(pairs, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
         # Somewhere on its way a curve is as steep as its chord.
@@ -84,9 +85,9 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
         if min(over) >= 1.0 + thresholds.same or max(over) * (1.0 + thresholds.same) <= 1.0:
             trap = trap or is_narrow
             said.append(
-                f"within a file the reading moves by {float(np.median(gains)) * to_physical:.3g} {unit}/N, between the"
-                f" files by {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, the"
-                " zero of reading or load is another in each file, or the files are not of one unit"
+                f"within a file the reading moves by {float(np.median(gains)) * to_physical:.3g} {symbol}/N, between"
+                f" the files by {between * to_physical:.3g} {symbol}/N: the gain within a file is not that of the unit,"
+                " the zero of reading or load is another in each file, or the files are not of one unit"
             )
     return Ranges(tuple(said), trap)
 
@@ -138,11 +139,12 @@ def _limit_foreign_gain(gains: Sequence[tuple[str, float | None]], thresholds: T
     ]
 
 
-def _limit_unlike_gain(sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
+def _limit_unlike_gain(sessions: Sequence[Session], unit: ExtendedModel, thresholds: Thresholds) -> list[str]:
     """Sentences on files whose gain differs from that of the first by more than equal gains do.
 
     Compared over loads that both have, and only where these are as high and as fast, so that neither a curve nor a rate
-    explains it. Far larger ratios are left to `_limit_foreign_gain`.
+    explains it. What holds more or less of its load relaxes more or less: the readings over what the baseline ``unit``
+    simulates must differ as well. Far larger ratios are left to `_limit_foreign_gain`.
     """
     first, *others = sessions
     name = first.recording.name
@@ -153,15 +155,24 @@ def _limit_unlike_gain(sessions: Sequence[Session], thresholds: Thresholds) -> l
             continue
         most = min(_highest(file, file.fitted) for file in (first, one))
         seen = [(file, file.fitted & (file.conditions.load <= most)) for file in (first, one)]
-        usual, gain = (_gain(file.conditions.load[at], file.reading[at], thresholds.follows) for file, at in seen)
-        if not usual or not gain or _near(gain, usual, thresholds.same):
+        of_load = _gain_ratio([(file.conditions.load[at], file.reading[at]) for file, at in seen], thresholds)
+        if of_load is None:
             continue
-        if 1.0 / thresholds.clear**2 < gain / usual < thresholds.clear**2:
+        relaxed = ((unit.simulate(file.conditions)[at], file.reading[at]) for file, at in seen)
+        if _gain_ratio([*relaxed], thresholds) is None:
+            continue
+        if 1.0 / thresholds.clear**2 < of_load < thresholds.clear**2:
             said.append(
-                f"{one.recording.name} reads {gain / usual:.3g} times what {name} does under a load that goes as high"
+                f"{one.recording.name} reads {of_load:.3g} times what {name} does under a load that goes as high"
                 " and as fast: is it of another unit, or was this one changed, or put back otherwise?"
             )
     return said
+
+
+def _gain_ratio(pairs: Sequence[tuple[Array, Array]], thresholds: Thresholds) -> float | None:
+    """The second file's gain over the first's, by loads and readings; None where they are alike or one is not known."""
+    usual, gain = (_gain(load, reading, thresholds.follows) for load, reading in pairs)
+    return None if not usual or not gain or _near(gain, usual, thresholds.same) else gain / usual
 
 
 def _near(one: float, other: float, same: float) -> bool:

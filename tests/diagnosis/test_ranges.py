@@ -10,9 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._ranges import Ranges, _limit_foreign_gain, loads_beyond_fit, ranges_of
 from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._session import prepare
+from smartshoe.models.effects import Conditions
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -31,7 +34,8 @@ def _ranges(*pairs: tuple[Array, Array], unit: str = "mbar", held_out: Sequence[
     ]
     usable = [np.ones(TIME_S.size, dtype=bool) for _ in recordings]
     scale = full_scale(recordings, usable, Thresholds())
-    return ranges_of(prepare(recordings, usable, held_out, scale, [1], Thresholds()), scale, Thresholds())
+    sessions = prepare(recordings, usable, held_out, scale, [1], Thresholds())
+    return ranges_of(sessions, baseline_of(sessions, scale), scale, Thresholds())
 
 
 def _proportional(low_n: float, high_n: float) -> tuple[Array, Array]:
@@ -82,7 +86,8 @@ def test_no_gain_is_divided_by_where_there_is_none() -> None:
     for given in (recordings[:1], recordings):
         usable = [np.ones(TIME_S.size, dtype=bool) for _ in given]
         scale = full_scale(given, usable, Thresholds())
-        found = ranges_of(prepare(given, usable, None, scale, [1], Thresholds()), scale, Thresholds())
+        sessions = prepare(given, usable, None, scale, [1], Thresholds())
+        found = ranges_of(sessions, baseline_of(sessions, scale), scale, Thresholds())
         assert found.is_trap
         assert "the mean reading is next to nothing" in found.says[0]
 
@@ -187,6 +192,18 @@ def test_neither_a_curve_nor_a_rate_makes_a_file_another_units() -> None:
     higher = 1.2 * load
     curve = [(one, GAIN_MBAR_PER_N * (one + 1.5 * np.maximum(one - 800.0, 0.0))) for one in (load, higher)]
     assert _unlike_ones(_ranges(*curve)) == []
+
+
+@pytest.mark.parametrize(("gain", "is_told"), [(1.0, False), (0.6, True)])
+def test_what_relaxes_in_longer_holds_makes_a_file_no_other_units(gain: float, is_told: bool) -> None:
+    """Holds of 16 s beside presses of 0.4 s, alike in height and rate, of a unit that doubles by relaxing."""
+    holds, presses = (np.where(TIME_S % every < held, 800.0, 0.0) for every, held in ((20.0, 16.0), (2.0, 0.4)))
+    unit = ExtendedModel(gain=1.0, relaxing_share=1.0, relaxation_rate_per_s=0.8, full_scale_load_n=1.0,
+                         full_scale_reading=GAIN_MBAR_PER_N, reading_unit="mbar")  # fmt: skip
+    loads = [np.convolve(load, np.full(10, 0.1), "same") for load in (holds, presses)]
+    whole, brief = (unit.reading(Conditions(TIME_S, load, step_s=0.02)) for load in loads)
+    assert np.polyfit(loads[1], brief, 1)[0] < 0.75 * np.polyfit(loads[0], whole, 1)[0]
+    assert bool(_unlike_ones(_ranges((loads[0], whole), (loads[1], gain * brief)))) is is_told
 
 
 @pytest.mark.parametrize(

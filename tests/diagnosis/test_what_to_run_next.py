@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from test_diagnosis_parts import MODEL, likelihood_of, recording, sessions_of
 
 from smartshoe import Protocol, Recording, diagnose
+from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS, paced
 from smartshoe.diagnosis._likelihood import fit
@@ -113,7 +114,7 @@ def test_loads_that_grow_with_the_clock_are_told_unless_it_begins_anew_with_each
 # -- narrow ranges ------------------------------------------------------------------------------------------------
 def _ranges(load: Array, reading: Array) -> Any:
     sessions, scale = prepared(pressed(load, reading))
-    return ranges_of(sessions, scale, STANDARD)
+    return ranges_of(sessions, baseline_of(sessions, scale), scale, STANDARD)
 
 
 def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None:
