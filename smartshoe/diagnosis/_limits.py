@@ -360,7 +360,8 @@ def limit_own_zeros(zeros: OwnZeros | None, scale: Scale) -> list[str]:
     apart = percent(float(np.ptp(zeros.offsets)))
     return [
         f"by the extended model, each recording has a zero of its own, from {told(low)} to {told(high)}, {apart} of"
-        " full scale apart: this is allowed for here (zero the load cell and the sensor before each)"
+        " full scale apart: this is allowed for here, and may be what the model misses of a recording (zero the load"
+        " cell and the sensor before each, to tell)"
     ]
 
 
