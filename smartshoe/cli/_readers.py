@@ -53,13 +53,15 @@ def dropping_what_nobody_reads() -> Iterator[None]:
 
 
 def _dropping(stream: Any) -> Any:
-    """``stream`` as a `_Dropping` one, where it is a text file and not None or an object of another kind."""
+    """``stream`` as a `_Dropping` one, where it is a text file and not None or an object of another kind.
+
+    A character that its encoding has not, as in a file's name under a code page, is written as an escape.
+    """
     if not isinstance(stream, io.TextIOWrapper):
         return stream
     stream.flush()
-    return _Dropping(
-        stream.buffer, encoding=stream.encoding, errors=stream.errors, line_buffering=stream.line_buffering
-    )
+    errors = "backslashreplace" if stream.errors == "strict" else stream.errors
+    return _Dropping(stream.buffer, encoding=stream.encoding, errors=errors, line_buffering=stream.line_buffering)
 
 
 def is_output_read() -> bool:

@@ -54,6 +54,21 @@ def test_a_refusal_keeps_its_status_and_its_sentence_though_nobody_reads_the_res
     assert said.startswith("error: ")
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_a_name_that_the_terminal_cannot_write_is_no_error(encoding: str, table: Path, tmp_path: Path) -> None:
+    named = tmp_path / "Zehe \N{LATIN SMALL LETTER U WITH DIAERESIS} \N{CJK UNIFIED IDEOGRAPH-8DB3}.csv"
+    named.write_bytes(table.read_bytes())
+    ended = subprocess.run(
+        [sys.executable, "-m", "smartshoe", "identify", str(named)],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding},
+        timeout=120,
+        check=False,
+    )
+    assert (ended.returncode, ended.stderr) == (0, b"")
+    assert b"\\u8db3" in ended.stdout
+
+
 def test_a_program_that_runs_a_command_keeps_its_own_output() -> None:
     script = (
         "import sys; from smartshoe import cli; sys.argv[1:] = ['--version']\ntry: cli.main()\nfinally: print('on')"

@@ -147,7 +147,9 @@ def test_lvm_faults_name_the_line_or_the_key(old: str, new: str, says: str, tmp_
 
 
 @pytest.mark.parametrize("ending", ["tdms", "mat", "h5", "parquet"])
-def test_truncated_files_are_refused_by_name(ending: str, tmp_path: Path) -> None:
+def test_truncated_files_are_refused_by_name_and_nothing_else_is_said(
+    ending: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     rng = np.random.default_rng(0)
     whole = tmp_path / f"x.{ending}"
     values = rng.normal(size=5000)
@@ -158,6 +160,7 @@ def test_truncated_files_are_refused_by_name(ending: str, tmp_path: Path) -> Non
         cut.write_bytes(raw[:keep])
         with pytest.raises(InputError, match=cut.name):
             smartshoe.read(cut)
+    assert not caplog.records
 
 
 def test_pickles_are_never_opened(tmp_path: Path) -> None:

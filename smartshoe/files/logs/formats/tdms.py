@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -71,7 +72,9 @@ def read(path: Path) -> Sheet:
 def _loaded(path: Path) -> tuple[Mapping[str, Any], list[tuple[str, Any]]]:
     """The file's properties and its channels (group, channel), after checking the sizes that they declare."""
     from nptdms import TdmsFile
+    from nptdms.log import log_manager
 
+    log_manager.set_level(logging.ERROR)  # what a truncated file lacks is said here, in one sentence
     with path.open("rb") as content:
         with TdmsFile.open(content) as file:
             lengths = [len(channel) for group in file.groups() for channel in group.channels()]
