@@ -266,3 +266,16 @@ def test_a_remark_that_is_called_as_a_column_of_a_foreign_unit_is_kept(tmp_path:
     found = smartshoe.read(tmp_path / "a.csv")
     assert (found.metadata["cap_ff"], found["cap"].unit.symbol) == ("of plates", "fF")
     assert "unit cap_ff" not in found.metadata
+
+
+def test_cells_in_quotes_may_hold_decimal_commas(tmp_path: Path) -> None:
+    """As spreadsheets export them; a quote without its second one is a fault of its line alone."""
+    path = tmp_path / "x.csv"
+    rows = ["time_s,force_n,pressure_mbar", *(f'"{k},0","{k},25","{2 * k},5"' for k in range(6))]
+    path.write_text("\n".join([*rows[:3], '"2,0,"2,25","4,5"', *rows[4:]]))
+    with pytest.raises(FormatError, match="line 4"):
+        smartshoe.read(path)
+    path.write_text("\n".join(rows))
+    recording = smartshoe.read(path)
+    np.testing.assert_array_equal(recording["force"].values, np.arange(6) + 0.25)
+    np.testing.assert_array_equal(recording["pressure"].values, 2.0 * np.arange(6) + 0.5)

@@ -135,6 +135,14 @@ def _data_lines(path: Path, header_line: int) -> tuple[list[str], list[int]]:
     return [line for _, line in rows], [number for number, _ in rows]
 
 
+def _cells(line: str) -> list[str]:
+    """The cells of a line; those of a spreadsheet may stand in quotes, with decimal commas."""
+    try:
+        return [cell.strip() for row in csv.reader([line], strict=True) for cell in row]
+    except csv.Error:  # a quote without its second one: the cell itself tells what is wrong
+        return [cell.strip() for cell in line.split(",")]
+
+
 def _read_slowly(path: Path, header: list[str], header_line: int) -> tuple[Array, list[int]]:
     """All cells, read one by one, raising `FormatError` at the first faulty one.
 
@@ -142,7 +150,7 @@ def _read_slowly(path: Path, header: list[str], header_line: int) -> tuple[Array
     ``time_s``, are left out.
     """
     lines, numbers = _data_lines(path, header_line)
-    rows = [[cell.strip() for cell in line.split(",")] for line in lines]
+    rows = [_cells(line) for line in lines]
     for row, number in zip(rows, numbers, strict=True):
         if len(row) != len(header):
             raise FormatError(
