@@ -6,7 +6,7 @@ the diagnosis as a whole, in a list that is empty where there is nothing to be s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -166,7 +166,9 @@ def reason_departure(name: Name, names: Sequence[Name], thresholds: Thresholds) 
     )
 
 
-def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
+def limit_relaxation_range(
+    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, *, beside_names: bool
+) -> list[str]:
     """The sentence on a unit that relaxes more slowly, or faster, than the baseline can follow."""
     slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
     if (
@@ -177,8 +179,8 @@ def limit_relaxation_range(model: ExtendedModel, sessions: Sequence[Session], th
     end_s = 1.0 / (RATE.lower if slow else RATE.upper)
     return [
         f"the baseline's relaxation is at the end of its range, {end_s:.3g} s:"
-        f" a unit that relaxes {'more slowly' if slow else 'faster'} cannot be followed, and what is named may stand"
-        " for this"
+        f" a unit that relaxes {'more slowly' if slow else 'faster'} cannot be followed"
+        + (", and what is named may stand for this" if beside_names else "")
     ]
 
 
@@ -407,18 +409,20 @@ def limit_nearest_law(found: Inference, thresholds: Thresholds) -> list[str]:
     ]
 
 
-def limit_refusals(found: Inference) -> list[str]:
-    """The sentences on effects that cross-validation removed or that cancel one another."""
+def limit_refusals(found: Inference, named: Collection[str] = ()) -> list[str]:
+    """The sentences on effects that cross-validation removed or that cancel one another, but for those ``named``."""
     if not found.can_validate:
         return [ONE_CYCLE]
     said = []
-    if found.cancelling_names:
+    cancelling, refused = (
+        [name for name in dict.fromkeys(names) if name not in named]
+        for names in (found.cancelling_names, found.refused)
+    )
+    if cancelling:
+        said.append(f"these effects largely cancel one another, so that none is named: {listed(cancelling)}")
+    if refused:
         said.append(
-            f"these effects largely cancel one another, so that none is named: {listed(found.cancelling_names)}"
-        )
-    if found.refused:
-        said.append(
-            f"tried and not kept: {listed(dict.fromkeys(found.refused))} (of no help in predicting recordings or load"
+            f"tried and not kept: {listed(refused)} (of no help in predicting recordings or load"
             " cycles left out in turn, or too small there to be trusted at the held-out loads)"
         )
     return said

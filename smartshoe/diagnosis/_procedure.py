@@ -398,11 +398,11 @@ def _limits_of_the_names(
     """What limits the names: effects that are no causes, models at the end of their range, refused effects."""
     return (
         *named.limits,
-        *limit_relaxation_range(extended, given.sessions, given.thresholds),
+        *limit_relaxation_range(extended, given.sessions, given.thresholds, beside_names=bool(named.names)),
         *limit_curve_range(extended, named.names),
         *limit_wall_ratio(extended, given.sessions, given.thresholds),
         *limit_nearest_law(found, given.thresholds),
-        *limit_refusals(found),
+        *limit_refusals(found, {one.effect.name for one in named.names} | {one.effect.name for one in named.zeros}),
     )
 
 

@@ -250,6 +250,11 @@ def test_what_was_taken_out_again_is_said_once() -> None:
     found.cancelling_names, found.refused = (), ("flexible_lag", "linear_leak")
     (said,) = limit_refusals(found)
     assert said.startswith("tried and not kept: lag of free form, linear leak (of no help")
+    # What has a name after all, as a tare that rests show, is not said to be none.
+    (said,) = limit_refusals(found, ["linear_leak"])
+    assert said.startswith("tried and not kept: lag of free form (of no help")
+    found.cancelling_names = ("rate_gain",)
+    assert limit_refusals(found, ["rate_gain", "flexible_lag", "linear_leak"]) == []
     found.can_validate = False
     (said,) = limit_refusals(found)
     assert "no cause can be told" in said

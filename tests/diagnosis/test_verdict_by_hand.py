@@ -521,7 +521,9 @@ def test_a_unit_beyond_the_range_that_can_be_followed_is_told(
     with_own = {"residual_of": lambda one, model: one.reading - model.simulate(one.conditions)}
     for name, stand_in in with_own.items():
         monkeypatch.setattr(_validation, name, stand_in)
-    found = limit_relaxation_range(model, [session], STANDARD)
+    found = limit_relaxation_range(model, [session], STANDARD, beside_names=True)
     assert (found == []) if said is None else said in found[0]
+    alone = limit_relaxation_range(model, [session], STANDARD, beside_names=False)
+    assert [one.partition(", and what is named may stand")[0] for one in found] == alone
     by_nothing = replace(model, relaxing_share=1e-4)
-    assert limit_relaxation_range(by_nothing, [session], STANDARD) == []
+    assert limit_relaxation_range(by_nothing, [session], STANDARD, beside_names=True) == []
