@@ -249,7 +249,10 @@ def _other_laws(
             # instead.
             held = base.with_part(law, fitted.model.part(law.name).values)
             fitted = fit(likelihood, held, FEW_STEPS, only_effect=law.name)
-        if of_curves and fitted.model.part(law.name).kind_ends_at:
+        part = fitted.model.part(law.name)
+        if law.is_null(part.values):
+            continue  # others took its place in the fit, so that it follows nothing
+        if of_curves and part.kind_ends_at:
             continue  # it is at the end of its kind, too
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
     return tuple(sorted(found, key=lambda a: a.margin))

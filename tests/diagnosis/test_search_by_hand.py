@@ -227,7 +227,9 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     near = [Alternative(name, 1.0) for name in ("orifice_leak", "zero_drift", "delay", "contact_area")]
     monkeypatch.setattr(_members, "alternatives", lambda *given: (Alternative(None, float(given[2])), *near))
     monkeypatch.setattr(
-        _members, "fit_with", lambda law, model, likelihood, *_: fitted(likelihood, model.with_part(law), 4)
+        _members,
+        "fit_with",
+        lambda law, model, likelihood, *_: fitted(likelihood, model.with_part(law, law.begun()), 4),
     )
     present = frozenset({"low_loads"})
     monkeypatch.setattr(_members, "excitation_of", lambda *given: SimpleNamespace(tells_apart=present))
@@ -328,7 +330,7 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
         assert beside.names == ()
         return SimpleNamespace(cost=110.0, model=model.with_part(law, ends.pop()))
 
-    ends = [[0.1, 120.0], [0.1, 119.0]]
+    ends = [[0.0, 20.0], [0.1, 120.0], [0.1, 119.0]]
     monkeypatch.setattr(_members, "fit_with", fitted)
     monkeypatch.setattr(_members, "fit", lambda likelihood, model, steps: SimpleNamespace(cost=104.0, model=model))
     monkeypatch.setattr(_members, "available_effects", lambda sessions, thresholds: [law])
@@ -340,6 +342,8 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
     assert tried == [(law.name, [shapes[2], shapes[0]])]
     (freed,) = _other_laws(one, less, extended, found, is_at_end_of_kind=False)
     assert (freed.effect, freed.margin) == (law.name, 4.0)  # freed of the bound it ended at
+    # Of a law that ends at nothing the others in the fit follow all.
+    assert _other_laws(one, less, extended, found, is_at_end_of_kind=False) == ()
 
 
 @pytest.mark.parametrize("goes_on", [True, False])
