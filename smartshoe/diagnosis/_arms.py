@@ -30,15 +30,31 @@ def with_another_pole(state: State) -> State:
 
 
 def latency_with_usual_arm(state: State) -> Fit:
-    """The best of fits with one effect that delays the reading, each from a usual arm.
+    """The best of fits with one effect that delays the reading and nothing else, each from a usual arm.
 
     The plain model's arm can imitate a lag, at its bounds or within them, and then no lag is found beside it.
     """
+    return latency_beside(with_usual_arm(state.fit.model), state)
+
+
+def latency_for_arm(state: State) -> Fit:
+    """The best of fits with one more effect that delays the reading in the place of the baseline's arm.
+
+    An arm that relaxes nearly all of the load is a lag in a free form, beside which the unit's own arm is an effect's.
+    """
+    model = state.fit.model
+    swapped = [with_arm(model.without(name), arm) for name, arm in arms_of(model)]
+    starts = [*swapped, with_usual_arm(_without_core_effects(model))]
+    return min((latency_beside(one, state) for one in starts), key=lambda one: one.cost)
+
+
+def latency_beside(bare: ExtendedModel, state: State) -> Fit:
+    """The best of fits of ``bare`` with one more effect that delays the reading."""
     likelihood = state.likelihood()
-    bare = with_usual_arm(state.fit.model)
     effects = available_effects(likelihood.sessions, state.thresholds)
     late = [one for one in effects if one.is_latency and one.name not in bare.names]
-    return min((fit(likelihood, start_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost)
+    starts = [start_with(one, bare, likelihood) for one in late] or [bare]
+    return min((fit(likelihood, one) for one in starts), key=lambda one: one.cost)
 
 
 def with_a_usual_arm(state: State) -> State:

@@ -71,6 +71,13 @@ def simpler_from(initial: State, state: State, progress: Progress) -> State:
     return state if other is state else replace(simpler(other, state), path=(*state.path, *other.path))
 
 
+def simpler_than(found: Fit, state: State, progress: Progress) -> State:
+    """The state that `converged` reaches from the fit ``found``, if already that is simpler; else ``state``."""
+    if _are_alike(found.model, state.fit.model, state.likelihood()) or not _is_simpler(found, state):
+        return state
+    return simpler_from(state_at(found, state.banned), state, progress)
+
+
 def simpler(other: State, state: State) -> State:
     """The simpler of two states; see `_is_simpler`."""
     return other if _is_simpler(other.fit, state) else state

@@ -19,7 +19,7 @@ from smartshoe.integrity import Integrity, examine, twins
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
 
-MOST_RECORDINGS = 200  # to fit, and to judge on: a resolution, since each is a session of its own to compute
+MOST_RECORDINGS = 50  # to fit, and to judge on: a resolution, since each is a session of its own to compute
 
 
 def _silent(_: str) -> None:

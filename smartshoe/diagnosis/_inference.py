@@ -11,13 +11,23 @@ from dataclasses import dataclass, replace
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import (
+    effect_count,
+    latency_for_arm,
     latency_with_usual_arm,
     with_a_usual_arm,
     with_another_pole,
     with_creeping_arm,
 )
 from smartshoe.diagnosis._baseline import has_arm_beyond_memory, has_extreme_arm
-from smartshoe.diagnosis._convergence import Progress, beyond_bounds, converged, law_or_block, simpler, simpler_from
+from smartshoe.diagnosis._convergence import (
+    Progress,
+    beyond_bounds,
+    converged,
+    law_or_block,
+    simpler,
+    simpler_from,
+    simpler_than,
+)
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._gains_and_zeros import (
     OwnGain,
@@ -215,6 +225,14 @@ def _converged_from(initial: State, progress: Progress) -> State:
     An effect that is missing from the model bends the baseline's arm, and a bent arm hides that effect.
     """
     state = converged(initial, progress)
+    if effect_count(state.fit.model) > effect_count(initial.fit.model):
+        # One delay may do what several effects do beside an arm that it has bent.
+        state = simpler_than(latency_with_usual_arm(initial), state, progress)
+    if has_extreme_arm(state.fit.model):
+        progress("trying a lag in the place of an arm that no wall has")
+        late = converged(state_at(latency_for_arm(state), state.banned), progress)
+        if not has_extreme_arm(late.fit.model):
+            state = simpler(late, law_or_block(late, state))
     if has_arm_beyond_memory(state.fit.model, initial.thresholds):
         progress("beginning anew from arms as units have")
         state = simpler_from(with_a_usual_arm(initial), state, progress)

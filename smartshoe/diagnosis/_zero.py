@@ -222,8 +222,9 @@ def zeros_of(
     is_clear = np.abs([load, reading]) >= z_limit * np.array([load_sd, reading_sd])
     if is_gauge and abs(reading - load) < z_limit * borne_sd:
         return ()  # the reading agrees with the load, so that the unit bears it
-    if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
-        return ()  # equal tare and offset would be a coincidence: the unit bears the load, on a curve of its own
+    if is_gauge and is_clear.all() and not commanded and thresholds.clear * reading > load > 0.0:
+        # Nearer to the load that is shown than to nothing: the unit may bear it, and is never seen unloaded.
+        return _zero_by_model(sessions, model, structure_rms, memory_size, thresholds, lasting_memory)
     is_clear[1] &= is_gauge and abs(reading) <= thresholds.foreign_zero  # for other sensors zero is a convention
     # A zero that only cancels a drift is that drift's error; one that cancels a memory began with it.
     is_clear[1] &= as_read[0] * as_read[1] > 0.0 and min(map(abs, as_read)) >= z_limit * as_read_sd

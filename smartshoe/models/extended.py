@@ -52,9 +52,9 @@ class Part:
         return [(one, float(value)) for one, value in zip(self.effect.parameters, self.values, strict=True)]
 
     @property
-    def kind_ends_at(self) -> tuple[tuple[EffectParameter, float], ...]:
+    def kind_ends_at(self) -> list[tuple[EffectParameter, float]]:
         """The parameters, with their values, that lie where the effect turns into one of another kind."""
-        return tuple((one, value) for one, value in self.valued if one.is_where_kind_ends(value))
+        return self.effect.kind_ends_at(self.values)
 
     @property
     def bends_too_little(self) -> bool:

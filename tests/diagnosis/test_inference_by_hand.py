@@ -103,7 +103,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
         unlikely=(), changeable=[], names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={},
-        best_single=None, weighed=[], ended={},
+        best_single=None, weighed=[], ended={}, counts={},
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -123,6 +123,9 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def named(name: str) -> Callable[..., Any]:
         return lambda one, *rest: state(f"{name} {one.name}")
+
+    def is_stretched(model: Any) -> bool:
+        return told.stretched is True or (bool(told.stretched) and getattr(model, "name", "") == told.stretched)
 
     def judged(one: Any, plain: Any, sessions: Any) -> Any:
         model = _Model(one.name)
@@ -156,13 +159,16 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
     monkeypatch.setattr(_inference, "evaluated", lambda *given: plain)
-    monkeypatch.setattr(_inference, "has_extreme_arm", lambda model: told.stretched)
+    monkeypatch.setattr(_inference, "has_extreme_arm", lambda model: is_stretched(model))
     monkeypatch.setattr(_inference, "has_arm_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "converged", converged)
     monkeypatch.setattr(_inference, "simpler_from", simpler_from)
     monkeypatch.setattr(_inference, "simpler", lambda other, one: state(f"({other.name} or {one.name})"))
+    monkeypatch.setattr(_inference, "simpler_than", lambda late, one, progress: state(f"<{late.name} or {one.name}>"))
+    monkeypatch.setattr(_inference, "effect_count", lambda model: told.counts.get(model.name, 0))
     monkeypatch.setattr(_inference, "latency_with_usual_arm", named("late"))
+    monkeypatch.setattr(_inference, "latency_for_arm", named("lag for the arm of"))
     monkeypatch.setattr(_inference, "state_at", lambda late, banned=(): late)
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
@@ -333,6 +339,21 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     flow.stretched = False
     assert flow.infer().fit.model == "(converged usual first or converged first)"
     flow.beyond = False
+    # An arm as no wall has beside effects is a lag in a free form, and one delay may do what several effects do.
+    flow.stretched = "converged first"
+    assert (
+        flow.infer().fit.model
+        == "(converged lag for the arm of converged first or converged lag for the arm of converged first)"
+    )
+    assert "trying a lag in the place of an arm that no wall has" in flow.said
+    flow.is_law = False  # it has no more evidence, but may be simpler
+    assert flow.infer().fit.model == "(converged lag for the arm of converged first or converged first)"
+    flow.stretched, flow.is_law = False, True
+    flow.counts = {"converged first": 1}
+    assert flow.infer().fit.model == "<late first or converged first>"
+    flow.counts = {"converged first": 1, "first": 1}
+    assert flow.infer().fit.model == "converged first"
+    flow.counts = {}
     flow.chosen = [SimpleNamespace(effect=effect("dead_band"))]
     assert flow.infer().fit.model == "converged first"
     flow.chosen.append(SimpleNamespace(effect=effect("linear_leak")))

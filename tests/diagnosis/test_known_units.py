@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -394,3 +395,55 @@ def test_an_adhesive_under_a_gauge_that_gives_way_by_no_single_exponential_is_a_
     assert found.verdict == "explained"
     assert {cause.effect.family for cause in found.causes} == {"relaxation"}
     assert found.causes[0].confidence > 0.75
+
+
+# -- what is far larger than the effects of a good unit ---------------------------------------------------------------
+def _clipped(share: float, load: Array) -> Array:
+    """A sensor that ends at a ``share`` of what the unit would give."""
+    return np.minimum(_solid(load, 3.0), share * PEAK_N)
+
+
+def _beyond_a_gap(share: float, load: Array) -> Array:
+    """A gap in the contact that bears a ``share`` of the largest load before the tube is touched."""
+    return _solid(np.maximum(load - share * PEAK_N, 0.0), 3.0)
+
+
+def _late(tau_s: float, load: Array) -> Array:
+    keep = float(np.exp(-STEP_S / tau_s))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], _solid(load, 3.0)))
+
+
+@pytest.mark.parametrize(
+    ("distorted", "size", "named"),
+    [
+        (_clipped, 0.4, "saturation"),
+        (_beyond_a_gap, 0.45, "dead_band"),
+        (_late, 0.1, "sensor_lag"),
+        (_late, 0.5, "sensor_lag"),
+    ],
+)
+def test_what_is_far_larger_than_small_effects_is_told_as_what_it_is(
+    distorted: Callable[[float, Array], Array], size: float, named: str
+) -> None:
+    """A range, a gap or a filter that was chosen wrongly: half of the load is lost, or a lag bends the wall's arm."""
+    loads = (TRIANGLES_N, HOLDS_N, 0.9 * HOLDS_N)
+    runs = [_run(load, distorted(size, load), f"run_{k}", 0.05, k) for k, load in enumerate(loads)]
+    found = diagnose(runs[:2], hold_out=runs[2:])
+    assert found.verdict == "explained"
+    assert found.causes[0].name == named
+    assert found.causes[0].confidence > 0.9
+    assert not [one.name for one in found.causes[1:] if one.confidence > 0.5]
+
+
+@pytest.mark.parametrize("offset_mbar", [-0.3, 0.4, 1.0])
+def test_a_preload_that_the_unit_bears_is_no_tare(offset_mbar: float) -> None:
+    """The machine touches the unit throughout, and its sensor is off: at rest both load and reading are above zero."""
+    preload = 0.8
+    courses = [np.concatenate([np.zeros(400), load]) for load in (TRIANGLES_N, HOLDS_N, 0.9 * HOLDS_N)]
+    runs = [
+        _run(load + preload, _solid(load, 3.0) + preload + offset_mbar, f"run_{k}", 0.05, k)
+        for k, load in enumerate(courses)
+    ]
+    found = diagnose(runs[:2], hold_out=runs[2:])
+    assert "load_cell_tare" not in [one.name for one in found.causes]
+    assert all(one.name == "zero_offset" and "load_cell_tare" in one.equivalents for one in found.causes)

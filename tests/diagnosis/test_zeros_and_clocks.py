@@ -105,9 +105,15 @@ def test_both_zeros_are_told_where_they_differ_the_larger_first() -> None:
     sessions, scale = _sessions(_run(tare=0.03, offset=-0.015, seed=1))
     found = zeros_of(sessions, baseline_of(sessions, scale), scale, 0.0, 0.0, STANDARD)
     assert [one.effect.name for one in found] == ["load_cell_tare", "zero_offset"]
-    # Where they are as large and of one sign the unit bears that load.
+    # Where they are of one sign, and the reading is nearer to the load than to nothing, the unit may bear that load: no
+    # tare is told, and an offset only where it is more than a curve may do below that load.
     assert _zeros(_run(tare=0.03, offset=0.03)) == {}
-    assert _zeros(_run(tare=0.03, offset=0.035)) == {}
+    for offset, is_lower in ((0.035, True), (0.016, True), (0.08, False)):
+        (borne,) = _zeros(_run(tare=0.03, offset=offset)).values()
+        assert (borne.effect.name, borne.alternatives) == ("zero_offset", ("load_cell_tare",))
+        assert borne.value == pytest.approx(offset - 0.03, abs=2e-3)
+        assert (borne.extrapolated_from > 0.0) is is_lower
+    assert set(_zeros(_run(tare=0.03, offset=0.014))) == {"load_cell_tare", "zero_offset"}
     assert set(_zeros(_run(tare=0.03, offset=-0.03))) == {"load_cell_tare", "zero_offset"}
 
 
@@ -269,9 +275,10 @@ def test_no_tare_is_told_where_a_drift_may_have_come_by_what_is_read_beyond_the_
 
     shown = [_run(tare=0.018, offset=0.018 + 0.03 * sign, seed=seed) for seed in (1, 2)]
     both = {"load_cell_tare", "zero_offset"}
+    beyond = both if sign < 0.0 else {"zero_offset"}  # what is read above the load is an offset, or the tare
     assert told(0.006, *shown) == [("zero_offset", True)]
-    assert {name for name, _ in told(0.002, *shown)} == both  # more than an order of magnitude
-    assert {name for name, _ in told(-0.006, *shown)} == both  # it drifts the other way
+    assert {name for name, _ in told(0.002, *shown)} == beyond  # more than an order of magnitude
+    assert {name for name, _ in told(-0.006, *shown)} == beyond  # it drifts the other way
     # A unit of which it is known that nothing presses it, and a load cell that shows a pull.
     command = replace(shown[0].load, name="command", role="command", values=FULL_N * PRESSED)
     assert {name for name, _ in told(0.006, *(one.with_channel(command) for one in shown))} == both

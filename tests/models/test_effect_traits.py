@@ -37,6 +37,7 @@ from smartshoe.models.effects import (
     told_apart_by,
 )
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, WORDS
+from smartshoe.models.effects.saturation import LOWEST
 from smartshoe.models.extended import ExtendedModel
 
 catalogue_module = import_module("smartshoe.models.effects.catalogue")  # the package has a function of this name
@@ -230,6 +231,31 @@ def test_one_latency_is_the_lag_between_two_clocks_and_one_their_rate() -> None:
         assert len(one.parameters) == 1
         at_once, later = one.late_s(np.array([0.5]), 0.0), one.late_s(np.array([0.5]), 10.0)
         assert (at_once, later) == ((0.5, 0.5) if one.between_clocks == "lag" else (0.0, 5.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "at"),
+    [
+        ("saturation", (0.99, 0.4, 0.02, 0.0), []),  # a sensor that ends at two fifths of what it is to read
+        ("saturation", (0.5, 0.4, 0.02, 0.0), ["level"]),
+        ("saturation", (0.3, 0.6, 0.02, 0.0), []),
+        ("saturation", (0.99, 0.55, 0.02, 0.0), ["level"]),  # where the search ends
+        ("saturation", (0.99, 0.8, 0.08, 0.0), ["knee"]),
+        ("dead_band", (0.6, 0.2, 0.0), []),  # a gap of three fifths
+        ("dead_band", (0.6, 0.5, 0.0), ["lost_load"]),  # of the first newtons 12 % pass
+        ("dead_band", (0.2, 2.0, 0.0), []),
+        ("dead_band", (0.8, 0.2, 0.0), ["lost_load"]),
+    ],
+)
+def test_what_clips_or_is_dead_is_no_curve_like_any_other_however_much_it_takes(
+    name: str, values: tuple[float, ...], at: list[str]
+) -> None:
+    one = effect(name)
+    if name == "saturation" and values[1] < LOWEST:
+        one = one.widened_at(np.array([values[0], LOWEST, *values[2:]]))
+    ends = one.kind_ends_at(np.array(values))
+    assert [one.name for one, _ in ends] == at
+    assert all(value in values for _, value in ends)
 
 
 def test_a_shift_adds_its_one_value() -> None:

@@ -371,7 +371,7 @@ def test_an_inverse_recovers_the_input_however_the_stream_is_cut(
 @settings(max_examples=200, deadline=None)
 @given(
     signal=arrays(float, st.integers(1, 60), elements=st.floats(-0.5, 3.0)), lost=st.floats(0.0, MOST_LOST),
-    level=st.floats(0.55, 1.5), knee=st.floats(1e-3, 0.08), rail=st.floats(0.0, 1.0), cut=st.integers(0, 60),
+    level=st.floats(0.1, 1.5), knee=st.floats(1e-3, 0.08), rail=st.floats(0.0, 1.0), cut=st.integers(0, 60),
 )  # fmt: skip
 def test_a_bend_that_leaves_half_of_the_slope_is_undone(
     signal: np.ndarray, lost: float, level: float, knee: float, rail: float, cut: int
@@ -396,7 +396,7 @@ def test_a_reading_that_loses_more_than_half_of_its_slope_is_lost(lost: float) -
 
 
 @given(
-    lost=st.floats(0.0, 1.0), level=st.floats(0.55, 1.5), knee=st.floats(1e-3, 0.08), rail=st.floats(0.0, 1.0),
+    lost=st.floats(0.0, 1.0), level=st.floats(0.1, 1.5), knee=st.floats(1e-3, 0.08), rail=st.floats(0.0, 1.0),
 )  # fmt: skip
 def test_the_slope_left_is_that_of_the_curve(lost: float, level: float, knee: float, rail: float) -> None:
     one, values, step = effect("saturation"), np.array([lost, level, knee, rail]), 1e-7

@@ -11,6 +11,8 @@ from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter,
 from smartshoe.models.effects.exposure import by
 
 LEAST_ONSET = 1e-9  # stands for an onset of 0
+MOST_OF_BEND = 0.3  # of full scale: a band that is wider is dead at first, or a curve like any other
+DEAD = 0.1  # of the slope: what is left of it in a dead band
 MOST = 1.3  # times the lost load: a band with a sharp end loses a little more just before it
 
 
@@ -28,7 +30,7 @@ class DeadBand(Effect):
     is_steep_undone = True
     says = "the first newtons of each loading do not reach the tube: no reading at low loads, a constant lack above"
     parameters = (
-        EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.3, 0.01,
+        EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.8, 0.01,
                         kind_ends="upper"),
         EffectParameter("softness", "1", "how far the gaps spread, over the lost load", None, 0.03, 3.0, 0.3),
         EffectParameter("onset", "1", "load over which the loss sets in, over the lost load", None, 0.0, 1.5, 0.3,
@@ -49,6 +51,12 @@ class DeadBand(Effect):
         if values[0] == 0.0:
             return signal.copy()
         return _passed(signal, *(float(value) for value in values))
+
+    def kind_ends_at(self, values: Array) -> list[tuple[EffectParameter, float]]:
+        """Also a large loss by gaps that spread so far that the first newtons pass in part."""
+        lost, soft, onset = (float(value) for value in values)
+        is_bend = lost >= MOST_OF_BEND and 1.0 / (1.0 + np.exp((1.0 + onset) / soft)) > DEAD
+        return [(self.parameters[0], lost)] if is_bend else super().kind_ends_at(values)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """By false position from y to y + f0; loads in a sharp band cannot be told apart, nor can noise about zero."""

@@ -360,6 +360,11 @@ class Effect(ABC):
                 values[k] = min(max(p.null + (sizes if p.upper > p.null else -sizes) * p.size, p.lower), p.upper)
         return values
 
+    def kind_ends_at(self, values: Array) -> list[tuple[EffectParameter, float]]:
+        """The parameters, with their ``values`` (k,), that lie where the effect turns into one of another kind."""
+        valued = ((one, float(value)) for one, value in zip(self.parameters, values, strict=True))
+        return [(one, value) for one, value in valued if one.is_where_kind_ends(value)]
+
     def is_null(self, values: Array) -> bool:
         """Whether every strength is at its null value."""
         return all(p.null is None or value == p.null for p, value in zip(self.parameters, values, strict=True))

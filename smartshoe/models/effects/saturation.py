@@ -12,6 +12,7 @@ from smartshoe.models.effects.exposure import by
 
 RAIL_KNEE = 5e-4  # of full scale: below a sensor's noise, but smooth enough for derivatives
 MOST_LOST = 0.5  # of the slope: a reading that loses more tells no load
+LOWEST = 0.55  # of full scale: what begins below it is a curve like any other, unless more than half is lost
 
 
 def _above(pressure: Array, level: float, knee: float) -> Array:
@@ -27,7 +28,8 @@ class Saturation(Effect):
     And max(P, 0) with the weight ``rail``, for a sensor whose membrane does not follow a pressure below zero. Where
     more than half of the slope is lost above the level, what was clipped is lost, and there is no inverse; with less it
     is a bend, which is undone. The block comes after the sensor's drifts and gain, as rails do. With a level far below
-    the top or a wide knee it would be a curve like any other: the bounds leave those to other blocks.
+    the top or a wide knee it would be a curve like any other: the bounds leave those to other blocks. Once it is found
+    and ends there, the level may lie lower: a sensor whose range is half of what it is to read.
     """
 
     name, family, stage, place = "saturation", "saturation", "sensor", "logger"
@@ -44,10 +46,11 @@ class Saturation(Effect):
             "FS_reading",
             "where it begins, from the reading without load on",
             None,
-            0.55,
+            LOWEST,
             1.5,
             0.1,
             kind_ends="lower",
+            farthest=0.1,
         ),
         EffectParameter(
             "knee", "FS_reading", "half width of the transition", None, 1e-3, 0.08, 0.01, kind_ends="upper"
@@ -76,6 +79,12 @@ class Saturation(Effect):
             inside = np.minimum(below, 2.0 * RAIL_KNEE)
             clipped += rail * (inside * inside / (4.0 * RAIL_KNEE) + below - inside)
         return clipped
+
+    def kind_ends_at(self, values: Array) -> list[tuple[EffectParameter, float]]:
+        """Also the level of a bend, which loses no more than half of the slope, far below the top."""
+        lost, level, ends = float(values[0]), float(values[1]), super().kind_ends_at(values)
+        is_bend = lost <= MOST_LOST and self.parameters[1].lower < level < LOWEST
+        return [(self.parameters[1], level), *ends] if is_bend else ends
 
     def slope_left(self, signal: Array, values: Array) -> Array:
         """1 below the level and 1 - s above it; 1 - ``rail`` below zero."""
