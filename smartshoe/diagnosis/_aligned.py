@@ -68,7 +68,8 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
             if is_beside_fitted:
                 said = (
                     f"the reading {does} those of the fitted recordings {by}; it was shifted to their clock before it"
-                    " is used as held-out data"
+                    " is used as held-out data, so that it tells nothing of a delay or a drift of clocks (either clock"
+                    " may be the wrong one)"
                 )
             elif integrity.are_about_mean:
                 said = (
