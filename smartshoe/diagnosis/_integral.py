@@ -17,8 +17,11 @@ def limit_integral(sessions: Sequence[Session], thresholds: Thresholds) -> list[
 
     Both are fitted together, by one gain each, beside a line in time for each session, and explain most of the
     readings' variance. What creeps, leaks or warms moves far less with the integral, and of what is late by a quarter
-    of a period the two explain little, unless the load is all but one sine.
+    of a period the two explain little, unless the load is all but one sine. Most of the load must be no line itself: a
+    single ramp, whose integral is a bow, tells no integral from a curve.
     """
+    if thresholds.clear * _share_beyond_lines(sessions) < 1.0:
+        return []
     of_load, of_integral, explained = _shares(sessions)
     if of_integral <= thresholds.clear * of_load or thresholds.clear * explained < 1.0:
         return []
@@ -29,6 +32,16 @@ def limit_integral(sessions: Sequence[Session], thresholds: Thresholds) -> list[
         " pressed unit does, so that none is more than half sure (diagnose the reading's rate of change, or hold each"
         " load until the reading stands)"
     ]
+
+
+def _share_beyond_lines(sessions: Sequence[Session]) -> float:
+    """The share of the load's variance that a line in time of each session leaves."""
+    left = total = 0.0
+    for one in fitted_of(sessions):
+        load, time_s = one.conditions.load[one.fitted], one.conditions.time_s[one.fitted]
+        total += float(np.sum((load - load.mean()) ** 2))
+        left += float(np.sum(left_by(np.column_stack([np.ones(load.size), time_s]), load[:, None]) ** 2))
+    return left / max(total, 1e-300)
 
 
 def _shares(sessions: Sequence[Session]) -> tuple[float, float, float]:

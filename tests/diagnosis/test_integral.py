@@ -54,6 +54,15 @@ def test_what_creeps_falls_or_lags_within_a_cycle_is_no_integral(share: float, s
     assert not limit_integral([session_under(load, reading)], STANDARD)
 
 
+@pytest.mark.parametrize("bow", [0.0, 0.02])
+@pytest.mark.parametrize("rest", [0, SIZE // 10])
+def test_one_ramp_tells_no_integral_from_a_curve(rest: int, bow: float) -> None:
+    """Unloading alone: the integral of a line is its square."""
+    load = np.concatenate([np.full(rest, 1.0), np.linspace(1.0, 0.0, SIZE)])
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(load.size)
+    assert not limit_integral([session_under(load, load + bow * load * (1.0 - load) + noise)], STANDARD)
+
+
 @pytest.mark.parametrize("late_s", [0.1, 0.25, 0.4, 0.8])
 def test_steps_that_are_late_by_a_quarter_of_a_stride_are_no_integral(late_s: float) -> None:
     """A walk of 28 s after and before a rest: its fundamental is late by a quarter of a period, the walk is not."""
