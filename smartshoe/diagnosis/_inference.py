@@ -330,7 +330,11 @@ def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Valida
 def _freed(
     found: _Validated, banned: tuple[str, ...], plain: Fit, sessions: Sequence[Session], progress: Progress
 ) -> _Validated:
-    """``found`` with laws beyond the bounds that they ended at, if that is validated and leaves less; else itself."""
+    """``found`` with laws beyond the bounds that they ended at, if that is validated and better; else itself.
+
+    It is better if it leaves less, or needs fewer effects and leaves no more than ``tolerable`` beside: what a law
+    missed at its bound had become another effect.
+    """
     if not found.fit.model.ended:
         return found
     at_bounds = state_at(found.fit, banned)
@@ -338,8 +342,10 @@ def _freed(
     if beyond is at_bounds:
         return found
     wider = _validated(beyond, plain, sessions)
-    leaves_less = error_of(sessions, wider.fit.model) < error_of(sessions, found.fit.model)
-    return wider if leaves_less and not wider.is_reduced else found
+    missed = error_of(sessions, wider.fit.model) ** 2 - error_of(sessions, found.fit.model) ** 2
+    needs_less = effect_count(wider.fit.model) < effect_count(found.fit.model)
+    is_better = missed < 0.0 or (needs_less and missed <= beyond.thresholds.tolerable**2)
+    return wider if is_better and not wider.is_reduced else found
 
 
 def _best_by_single_changes(

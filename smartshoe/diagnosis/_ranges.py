@@ -59,8 +59,8 @@ def ranges_of(sessions: Sequence[Session], unit: ExtendedModel, scale: Scale, th
             f" {_gain_in_words(gain * to_physical, symbol)}"
             + (
                 f", {over_load}: load and reading may both follow a third thing (a reversal, a regulator), so that this"
-                " gain is none to calibrate by, and no cause is named (if nothing presses at the lowest load shown, that"
-                " is the load cell's tare: take it off the loads)"
+                " gain is none to calibrate by, and no cause is named (if nothing presses at the lowest load shown,"
+                " that is the load cell's tare: take it off the loads)"
                 if trap
                 else ": what lies below is extrapolated"
             )
