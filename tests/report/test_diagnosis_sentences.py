@@ -190,7 +190,11 @@ def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> Non
     doubted = replace(made, causes=(*made.causes, replace(made.causes[0], confidence=0.74)))
     assert heading(doubted).endswith("it is known what follows it, though not each cause is sure")
     zero_limits = replace(made, extended=made.baseline)
-    assert heading(zero_limits) == "The simulation is good enough once the zero of the recordings is allowed for"
+    zero, late = (replace(made.causes[0], effect=effect(name)) for name in ("zero_offset", "delay"))
+    for causes, own in (((zero,), "the zero"), ((late,), "the clock"), ((late, zero), "the zero and the clock")):
+        told = replace(zero_limits, causes=causes)
+        assert heading(told) == f"The simulation is good enough but for {own} of the recordings"
+        assert f"allows for {own} of the recordings" in what_was_gained(told)
     assert heading(replace(zero_limits, verdict="partly_explained")).startswith("The simulation is wrong")
 
 

@@ -26,7 +26,6 @@ HEADINGS = {
 }
 NOT_SURE = "The simulation is wrong, and it is known what follows it, though not each cause is sure"
 REJECTED = "The simulation is wrong, and what would explain it is rejected: it is worse on data that was not fitted"
-OF_THEIR_OWN = "The simulation is good enough once the zero of the recordings is allowed for"
 INTERVALS = (
     "A parameter's interval is of the noise alone: where its equation is not exact the value may be off by more."
 )
@@ -56,7 +55,7 @@ def heading(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict != "explained":
         return HEADINGS[diagnosis.verdict]
     if is_of_recordings(diagnosis):
-        return OF_THEIR_OWN
+        return f"The simulation is good enough but for {_of_their_own(diagnosis)} of the recordings"
     is_sure = all(cause.confidence >= diagnosis.thresholds.least_confidence for cause in diagnosis.causes)
     return HEADINGS["explained"] if is_sure else NOT_SURE
 
@@ -66,6 +65,12 @@ def is_of_recordings(diagnosis: Diagnosis) -> bool:
     before, after = diagnosis.baseline, diagnosis.extended
     is_as_before = before and after and before.rmse == after.rmse
     return bool(diagnosis.causes and is_as_before and diagnosis.rejected is None)
+
+
+def _of_their_own(diagnosis: Diagnosis) -> str:
+    """What the causes of `is_of_recordings` are: the zero, the clock, or both."""
+    clocks = [one.effect.is_latency for one in diagnosis.causes]
+    return "the zero and the clock" if any(clocks) and not all(clocks) else "the clock" if all(clocks) else "the zero"
 
 
 def how_sure(cause: Cause) -> str:
@@ -277,7 +282,8 @@ def what_was_gained(diagnosis: Diagnosis) -> str:
     did = "Added" if diagnosis.rejected is None else "Tried and rejected"
     added = f"{did}: {'; '.join([', '.join(names), *without] if names else without)}."
     if is_of_recordings(diagnosis):
-        return f"{added} The plain model allows for the zero of the recordings, so that the error stays as it is."
+        own = _of_their_own(diagnosis)
+        return f"{added} The plain model allows for {own} of the recordings, so that the error stays as it is."
     won = diagnosis.gain
     if won is None or not math.isfinite(won.gain_percent):
         return added
