@@ -78,7 +78,7 @@ def ranges_of(sessions: Sequence[Session], unit: ExtendedModel, scale: Scale, th
     beside = [_gain(one.conditions.load[one.judged], one.reading[one.judged], thresholds.follows) for one in judged]
     named = [one.recording.name for one in (*fitted, *judged)]
     said += _limit_foreign_gain(list(zip(named, (*within, *beside), strict=True)), thresholds)
-    said += _limit_unlike_gain(fitted, unit, thresholds)
+    said += _limit_unlike_gain([*fitted, *judged], unit, thresholds)
     between = _gain_between_files(pairs, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
         # Somewhere on its way a curve is as steep as its chord.
@@ -145,7 +145,8 @@ def _limit_unlike_gain(sessions: Sequence[Session], unit: ExtendedModel, thresho
 
     Compared over loads that both have, and only where these are as high and as fast, so that neither a curve nor a rate
     explains it. What holds more or less of its load relaxes more or less: the readings over what the baseline ``unit``
-    simulates must differ as well. Far larger ratios are left to `_limit_foreign_gain`.
+    simulates must differ as well. Recordings that only judge are asked too. Far larger ratios are left to
+    `_limit_foreign_gain`.
     """
     first, *others = sessions
     name = first.recording.name
@@ -154,8 +155,9 @@ def _limit_unlike_gain(sessions: Sequence[Session], unit: ExtendedModel, thresho
         # All recorded loads count here, held out or not.
         if not all(_near(of(first, first.usable), of(one, one.usable), thresholds.same) for of in (_fastest, _highest)):
             continue
-        most = min(_highest(file, file.fitted) for file in (first, one))
-        seen = [(file, file.fitted & (file.conditions.load <= most)) for file in (first, one)]
+        known = [(file, file.fitted if file.fitted.any() else file.judged) for file in (first, one)]
+        most = min(_highest(*each) for each in known)
+        seen = [(file, mask & (file.conditions.load <= most)) for file, mask in known]
         of_load = _gain_ratio([(file.conditions.load[at], file.reading[at]) for file, at in seen], thresholds)
         if of_load is None:
             continue

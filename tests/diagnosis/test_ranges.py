@@ -183,6 +183,13 @@ def test_a_file_of_another_gain_under_a_like_load_is_named(ratio: float, is_told
     assert not is_told or f"run_1 reads {ratio:.3g} times what run_0 does" in _unlike_ones(found)[0]
 
 
+def test_a_file_that_only_judges_is_asked_whether_it_is_of_the_same_unit() -> None:
+    load, reading = _proportional(0.0, 800.0)
+    (said,) = _unlike_ones(_ranges((load, reading), (load, 2.0 * reading), held_out=[False, True]))
+    assert said.startswith("run_1 reads 2 times what run_0 does")
+    assert _unlike_ones(_ranges((load, reading), (load, 1.1 * reading), held_out=[False, True])) == []
+
+
 def test_neither_a_curve_nor_a_rate_makes_a_file_another_units() -> None:
     """Loads that go less high, or more slowly, are not alike; of those that are, only what both have counts."""
     load, reading = _proportional(0.0, 800.0)
