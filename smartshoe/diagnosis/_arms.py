@@ -30,7 +30,7 @@ def with_another_pole(state: State) -> State:
 
 
 def latency_with_usual_arm(state: State) -> Fit:
-    """The best of fits with one effect that delays the reading and nothing else, each from a usual arm.
+    """The best of fits with one more effect that delays the reading, each from a usual arm.
 
     The plain model's arm can imitate a lag, at its bounds or within them, and then no lag is found beside it.
     """
