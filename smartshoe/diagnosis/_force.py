@@ -254,12 +254,15 @@ def _farthest_off(there: Sequence[Session], off_n: Iterable[Array], model: Exten
 
 
 def _as_logged(session: Session, scale: Scale) -> Array:
-    """(n,) the reading with the samples that are not usable as they were logged, a share of full scale."""
-    recording = session.recording
-    present = recording.sensor.present
-    time_s = recording.time_s[present] - recording.time_s[0]
-    logged = np.interp(session.conditions.time_s, time_s, scale.share(reading_in(recording, scale.unit)[present]))
-    return np.where(session.usable, session.reading, logged)
+    """(n,) the reading with its samples that are not usable as they were logged, a share of full scale.
+
+    Where the load is not known the reading is not at fault: there it stays as it is.
+    """
+    recording, at_s = session.recording, session.conditions.time_s
+    time_s, present = recording.time_s - recording.time_s[0], recording.sensor.present
+    logged = np.interp(at_s, time_s[present], scale.share(reading_in(recording, scale.unit)[present]))
+    has_load = np.interp(at_s, time_s, recording.load.present) == 1.0
+    return np.where(session.usable | ~has_load, session.reading, logged)
 
 
 def _force_error_n(session: Session, model: ExtendedModel, reading: Array | None = None) -> Array:

@@ -32,6 +32,7 @@ from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
 from smartshoe.integrity._stepped_load import between_steps
+from smartshoe.integrity._still_load import still_load
 from smartshoe.integrity._view import UNKNOWN_ENDS, Ends, Signal, View
 from smartshoe.integrity._wild import with_missing, without_wild
 from smartshoe.integrity._wrapped import unwrapped
@@ -52,6 +53,7 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     wrong_sign,
     dropouts,
     load_dropouts,
+    still_load,
     low_rail,
     held_samples,
     spikes,
