@@ -11,7 +11,7 @@ from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, best_additions
 from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, state_at
-from smartshoe.diagnosis._validation import error_of, rms_difference
+from smartshoe.diagnosis._validation import error_of, is_tolerable, rms_difference
 from smartshoe.models.effects import listed
 from smartshoe.models.extended import ExtendedModel
 
@@ -110,8 +110,9 @@ def law_or_block(lawful: State, state: State) -> State:
     imperfections of a good unit (``tolerable``) and needs no more effects, the law is taken in any case.
     """
     sessions = state.linearisation.sessions
-    missed = error_of(sessions, lawful.fit.model) ** 2 - error_of(sessions, state.fit.model) ** 2
-    if missed <= state.thresholds.tolerable**2 and effect_count(lawful.fit.model) <= effect_count(state.fit.model):
+    left, before = error_of(sessions, lawful.fit.model), error_of(sessions, state.fit.model)
+    needs_no_more = effect_count(lawful.fit.model) <= effect_count(state.fit.model)
+    if needs_no_more and is_tolerable(left, before, state.thresholds):
         return lawful
     return lawful if _has_as_much_evidence(lawful, state) else state
 

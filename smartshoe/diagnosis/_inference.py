@@ -48,7 +48,14 @@ from smartshoe.diagnosis._search import BREADTH, best_additions
 from smartshoe.diagnosis._sensitivity import NON_PRESSURES, Linearised, is_remembered_by_gas, linearised
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._state import State, evidence_about, fit_of_set, linearised_search, set_of, state_at
-from smartshoe.diagnosis._validation import LeftOut, cancelling_effects, error_of, extrapolating_effect, folds_of
+from smartshoe.diagnosis._validation import (
+    LeftOut,
+    cancelling_effects,
+    error_of,
+    extrapolating_effect,
+    folds_of,
+    is_tolerable,
+)
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import listed
 from smartshoe.models.effects.effect import CoreEffect, Effect
@@ -106,8 +113,8 @@ def infer_with_gas_check(
         return found
     progress("going through it again without what a gas remembers")
     other = infer(start, [replace(one, without_gas_memory=True) for one in sessions], thresholds, progress, is_unit)
-    missed = error_of(sessions, other.fit.model) ** 2 - error_of(sessions, found.fit.model) ** 2
-    return other if missed <= thresholds.tolerable**2 else found
+    left, before = error_of(sessions, other.fit.model), error_of(sessions, found.fit.model)
+    return other if is_tolerable(left, before, thresholds) else found
 
 
 def infer(
@@ -342,9 +349,9 @@ def _freed(
     if beyond is at_bounds:
         return found
     wider = _validated(beyond, plain, sessions)
-    missed = error_of(sessions, wider.fit.model) ** 2 - error_of(sessions, found.fit.model) ** 2
+    left, before = error_of(sessions, wider.fit.model), error_of(sessions, found.fit.model)
     needs_less = effect_count(wider.fit.model) < effect_count(found.fit.model)
-    is_better = missed < 0.0 or (needs_less and missed <= beyond.thresholds.tolerable**2)
+    is_better = left < before or (needs_less and is_tolerable(left, before, beyond.thresholds))
     return wider if is_better and not wider.is_reduced else found
 
 

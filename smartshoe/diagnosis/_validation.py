@@ -239,6 +239,11 @@ def error_of(sessions: Sequence[Session], model: ExtendedModel) -> float:
     return fitted_rms(sessions, [residual_of(session, model) for session in sessions])
 
 
+def is_tolerable(error: float, beside: float, thresholds: Thresholds) -> bool:
+    """Whether an ``error`` (rms) is larger than another, ``beside``, by no more than small imperfections add up to."""
+    return error**2 - beside**2 <= thresholds.tolerable**2
+
+
 def rms_difference(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
     """Rms difference of two models' readings over the fitted samples, each recording's own terms aside."""
     return fitted_rms(sessions, [residual_of(session, first) - residual_of(session, second) for session in sessions])
