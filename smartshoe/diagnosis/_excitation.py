@@ -123,11 +123,11 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     rises = [rise for own in each for rise in own]
     rated = [rise for rise in rises if rise.is_rated]
     hold_s = max((_longest_read_s(one, _held(one, thresholds)) for one in sessions), default=0.0)
-    rested = [(_rested(one, thresholds), one.conditions.step_s) for one in sessions]
-    rest_s = max((_longest_read_s(one, mask) for one, (mask, _) in zip(sessions, rested, strict=True)), default=0.0)
+    rests = [(rested(one, thresholds), one.conditions.step_s) for one in sessions]
+    rest_s = max((_longest_read_s(one, mask) for one, (mask, _) in zip(sessions, rests, strict=True)), default=0.0)
     # What a unit does at rest shows afterwards, even if nothing is read meanwhile.
-    idle_s = max((n * step_s for mask, step_s in rested for n in _run_lengths(mask)), default=0.0)
-    pauses = [n * step_s for mask, step_s in rested for n in _run_lengths(_inner_runs(mask))]
+    idle_s = max((n * step_s for mask, step_s in rests for n in _run_lengths(mask)), default=0.0)
+    pauses = [n * step_s for mask, step_s in rests for n in _run_lengths(_inner_runs(mask))]
     # The ends of a ramp are smeared by the filter's window, and known to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
@@ -252,7 +252,7 @@ def _held(session: Session, thresholds: Thresholds) -> Mask:
     return np.asarray(_still(session, thresholds) & stays_still(session, thresholds) & is_borne)
 
 
-def _rested(session: Session, thresholds: Thresholds) -> Mask:
+def rested(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where there is no load and it does not move."""
     return np.asarray(_still(session, thresholds) & session.resting)
 

@@ -142,6 +142,16 @@ def limit_remembered(names: Sequence[Name]) -> list[str]:
     ]
 
 
+def limit_load_cell_moves(names: Sequence[Name]) -> list[str]:
+    """Sentences on effects that may be a zero of the load cell that moves (`may_be_of_the_load_cell`)."""
+    return [
+        f"at rest the logged load moves as {in_words(one.effect.name)} has it, and the reading stays: the load cell's"
+        f" zero may move and not the unit's, so that {in_words(one.effect.name)} is half sure at most (let the load"
+        " cell warm up, and zero it before each recording)"
+        for one in names
+    ]
+
+
 def reason_few_cycles(name: Name, cycles: int) -> str:
     """Why an effect is no cause where there are as many surer ones as load cycles."""
     most = f"{counted(cycles, 'load cycle')} cannot show more than {counted(cycles, 'cause')}, and others are surer"

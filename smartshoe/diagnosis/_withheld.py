@@ -10,6 +10,7 @@ from smartshoe.diagnosis._limits import (
     limit_clocks_disagree,
     limit_curves_in_tare,
     limit_force_as_logged,
+    limit_load_cell_moves,
     limit_remembered,
     limit_zero_drifted,
     limit_zero_extrapolated,
@@ -22,6 +23,7 @@ from smartshoe.diagnosis._limits import (
     reason_tare_creeps,
 )
 from smartshoe.diagnosis._load_cycles import load_cycles
+from smartshoe.diagnosis._load_drift import may_be_of_the_load_cell
 from smartshoe.diagnosis._naming import Name, capped_at_half, names_of
 from smartshoe.diagnosis._prepared import Prepared
 from smartshoe.diagnosis._remembered import may_be_remembered
@@ -33,6 +35,7 @@ JUMPS = "the zero jumps within recordings, and jumps that are not seen may look 
 AN_INTEGRAL = "the reading goes with the integral of the load, as no pressed unit's does"
 UNDONE = "other effects of the model undo a part of it"
 REMEMBERED = "it may be a memory of loads before the recordings"
+OF_THE_LOAD_CELL = "at rest the logged load moves as it has it, and not the reading: the load cell's zero may move"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
         lambda one: reason_clocks_aligned(one) if given.is_moved and one.effect.is_latency else None
     )
     chosen = _with_what_is_remembered(chosen, found, given)
+    chosen = _with_what_the_load_cell_does(chosen, found, given)
     rivals = chosen.names
     chosen = chosen.without(lambda one: reason_departure(one, rivals, thresholds))
     cycles = load_cycles(given.sessions, thresholds)
@@ -110,6 +114,14 @@ def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepa
     unsure = [one for one in chosen.names if may_be_remembered(one, *about)]
     names = tuple(capped_at_half(one, REMEMBERED) if one in unsure else one for one in chosen.names)
     return replace(chosen, names=names, limits=(*chosen.limits, *limit_remembered(unsure)))
+
+
+def _with_what_the_load_cell_does(chosen: NamedCauses, found: Inference, given: Prepared) -> NamedCauses:
+    """``chosen`` with those effects half sure at most that only undo at rest what the load cell's zero does."""
+    about = found.fit.model, given.sessions, given.thresholds
+    unsure = [one for one in chosen.names if may_be_of_the_load_cell(one, *about)]
+    names = tuple(capped_at_half(one, OF_THE_LOAD_CELL) if one in unsure else one for one in chosen.names)
+    return replace(chosen, names=names, limits=(*chosen.limits, *limit_load_cell_moves(unsure)))
 
 
 def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCauses:

@@ -111,6 +111,7 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("reason_of_another_kind", lambda name, *_: "it turned" if name.name == "turned" else None)
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("may_be_remembered", lambda *_: False)
+    answer("may_be_of_the_load_cell", lambda *_: False)
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
     answer("fitted_rms", lambda *_: made.off)
     answer("cause_of", cause)
