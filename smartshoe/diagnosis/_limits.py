@@ -142,6 +142,21 @@ def limit_remembered(names: Sequence[Name]) -> list[str]:
     ]
 
 
+def limit_noisy_load(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> list[str]:
+    """The sentence on a load of which, where it was fitted, averaging leaves more noise than is ``tolerable``."""
+    fitted = fitted_of(sessions)
+    worst = max(fitted, key=lambda one: one.conditions.load_noise, default=None)
+    if worst is None or worst.conditions.load_noise <= thresholds.tolerable:
+        return []
+    logged, left = worst.denoised.raw_sd, worst.conditions.load_noise
+    return [
+        f"the load of {worst.recording.name} is noisy: by {logged * scale.load_n:.2g} N rms ({percent(logged)} of full"
+        f" scale), of which {left * scale.load_n:.2g} N are left after averaging: errors of that size are the load's,"
+        " hide smaller effects and may look like others (mend the load cell's wiring, or log it through a filter, and"
+        " the reading through the same)"
+    ]
+
+
 def limit_load_cell_moves(names: Sequence[Name]) -> list[str]:
     """Sentences on effects that may be a zero of the load cell that moves (`may_be_of_the_load_cell`)."""
     return [

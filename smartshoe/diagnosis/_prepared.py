@@ -13,6 +13,7 @@ from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._grid import longest_step_s
 from smartshoe.diagnosis._integral import limit_integral
+from smartshoe.diagnosis._limits import limit_noisy_load
 from smartshoe.diagnosis._neighbours import with_one_neighbour
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._scale import Scale, fitted_lengths, full_scale, thinning
@@ -93,6 +94,7 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
         *ranges.says,
         *(said for said in said_of_curve if said is not None),
         *integral,
+        *limit_noisy_load(sessions, scale, thresholds),
         *excitation.limits(),
     ]
     seen = [one for one in zeros_of(sessions, start, scale, 0.0, 0.0, thresholds) if one.is_seen]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -59,3 +61,23 @@ def test_what_noise_of_the_load_brings_is_fitted_apart(asked: int) -> None:
     assert growing_noise(residual, load, 1.0 / RATE_HZ, asked, left) is None
     more = residual + 3e-2 * weight / weight.max() * rng.standard_normal(load.size)
     assert growing_noise(more, load, 1.0 / RATE_HZ, asked, left) is not None
+
+
+@pytest.mark.parametrize(("noise", "is_told"), [(0.02, True), (0.1, True), (0.002, False)])
+def test_a_load_cell_as_noisy_as_to_limit_what_is_seen_is_told(noise: float, is_told: bool) -> None:
+    rng = np.random.default_rng(3)
+    load = np.interp(np.arange(6000) % 1000, [0, 200, 600, 1000], [0.0, 0.0, 1.0, 0.0])
+    found = diagnose(
+        [
+            Recording.from_arrays(
+                time_s=0.01 * np.arange(load.size),
+                force_n=800.0 * (load + noise * rng.standard_normal(load.size)),
+                pressure_mbar=200.0 * load + 0.1 * rng.standard_normal(load.size),
+            )
+        ]
+    )
+    said = [str(one) for one in found.limits if "the load of recording is noisy" in str(one)]
+    assert len(said) == is_told
+    for told in said:
+        (logged_n,) = re.findall(r"by ([\d.]+) N rms", told)
+        assert float(logged_n) == pytest.approx(800.0 * noise, rel=0.15)
