@@ -140,7 +140,7 @@ def _examined_together(cleaned: Sequence[_Cleaned], thresholds: Thresholds, coun
     """
     examined = [_examined(one, thresholds) for one in cleaned]
     ends = _ends_seen_in([finding for one in examined for finding in one.findings])
-    if ends.dropouts.size + ends.rails.size and len(cleaned) > 1:
+    if ends.dropouts.size + ends.rails.size + ends.loads.size and len(cleaned) > 1:
         examined = [_examined(one, thresholds, ends) for one in cleaned]
     with_load = [one.alone.lags for one in examined[:count] if not one.is_against]
     if not any(one.is_against for one in examined) or (clock := one_clock(with_load, thresholds)) is None:
@@ -163,9 +163,11 @@ def _refusal(recording: Recording, found: _Examined, thresholds: Thresholds) -> 
 
 
 def _ends_seen_in(findings: Sequence[Finding]) -> Ends:
-    """The ends of the unit's sensor that ``findings`` of any recording show."""
+    """The ends of the unit's sensor and of its load cell that ``findings`` of any recording show."""
+    dropouts = np.unique(np.concatenate([np.zeros(0), *(one.values for one in findings)]))
     rails = [one.rail for one in findings if one.rail is not None]
-    return Ends(np.unique(np.concatenate([np.zeros(0), *(one.values for one in findings)])), np.unique(rails))
+    loads = [one.load_end for one in findings if one.load_end is not None]
+    return Ends(dropouts, np.unique(rails), np.unique(loads))
 
 
 def _cleaned(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Cleaned]:

@@ -52,7 +52,7 @@ class Finding:
     ``masks``: no fit may use those samples. ``cut_off`` (n,): other samples that no fit may use, though they are no
     fault: at rest beyond the end of the sensor. ``no_load`` (n,): samples of the load that are not the load. ``values``
     (v,): the values, as recorded, that the reading takes exactly by this fault; ``rail``: the value at which the sensor
-    ends. ``error`` and ``lines_hz``: as in `DataFault`.
+    ends; ``load_end``: the load in N at which the load cell ends. ``error`` and ``lines_hz``: as in `DataFault`.
     """
 
     kind: str
@@ -65,6 +65,7 @@ class Finding:
     no_load: Mask | None = None
     cut_off: Mask | None = None
     rail: float | None = None
+    load_end: float | None = None
     lines_hz: tuple[float, ...] = ()
 
     @classmethod

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,47 +16,67 @@ from smartshoe.signals.masks import runs_of
 
 
 def still_load(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kinds ``saturation`` and ``held_samples``; masked: the load repeats one value while the reading goes on.
+    """Kinds ``saturation`` and ``held_samples``; masked: the load stands while the reading goes on.
 
-    At its largest value the load cell is at the end of its range; at another its channel froze. At its smallest value
-    the load may be nothing, whatever the unit reads then.
+    At its largest value the load cell is at the end of its range; at another, repeated exactly, its channel froze. At
+    its smallest value the load may be nothing, whatever the unit reads then.
     """
-    load = view.load.values
-    is_top, is_frozen = np.zeros(load.size, dtype=bool), np.zeros(load.size, dtype=bool)
-    largest, smallest, hidden = float(load.max()), float(load.min()), 0.0
-    for first, last in zip(*runs_of((np.diff(load) == 0.0) & ~view.gap), strict=True):
-        if last - first < 2 * view.thresholds.few or load[first] == smallest or bad[first : last + 1].any():
-            continue
-        beyond = _rise_and_return(view, first, last)
-        if load[first] == largest and beyond > 0.0:
-            is_top[first : last + 1], hidden = True, max(hidden, beyond)
-        elif _is_frozen(view, first, last):
-            is_frozen[first : last + 1] = True
-    if is_top.any():
+    at_end, hidden = _at_the_cells_end(view, bad)
+    if at_end.any():
+        largest = float(view.load.values.max())
+        meanwhile = f" while the reading rises on and comes back, by up to {percent(hidden / view.span)} of its span"
         says = (
-            f"the load repeats its largest value, {largest:.6g} N, at {int(is_top.sum())} samples"
-            f" ({percent(float(is_top.mean()))}) while the reading rises on and comes back, by up to"
-            f" {percent(hidden / view.span)} of its span: the load cell or its converter saturates there; these samples"
-            " are left out, and what the unit remembers of them is not known: record again with a larger range"
+            f"the load stands at its largest value, {largest:.6g} N, at {int(at_end.sum())} samples"
+            f" ({percent(float(at_end.mean()))}){meanwhile if hidden > 0.0 else ', as in another recording'}: the load"
+            " cell or its converter saturates there; these samples are left out, and what the unit remembers of them is not"
+            " known: record again with a larger range"
         )
-        yield _finding(view, "saturation", is_top, says)
-    if is_frozen.any():
-        starts, stops = runs_of(is_frozen)
+        yield replace(_finding(view, "saturation", at_end, says), load_end=largest)
+    frozen = _frozen(view, bad | at_end)
+    if frozen.any():
+        starts, stops = runs_of(frozen)
         longest_s = float(np.max(view.time_s[stops - 1] - view.time_s[starts]))
         says = (
             f"the load repeats one value for up to {longest_s:.3g} s while the reading goes through much of its span:"
-            f" its channel froze; {int(is_frozen.sum())} samples are left out, and what the unit remembers of them is"
-            " not known: find what froze"
+            f" its channel froze; {int(frozen.sum())} samples are left out, and what the unit remembers of them is not"
+            " known: find what froze"
         )
-        yield _finding(view, "held_samples", is_frozen, says)
+        yield _finding(view, "held_samples", frozen, says)
+
+
+def _at_the_cells_end(view: View, bad: Mask) -> tuple[Mask, float]:
+    """(m,) samples whose load is at the cell's end, and by how much the reading rises on there; 0 where none shows it.
+
+    One run of them that shows it, here or in another recording, tells it of all: also of holds beyond that end.
+    """
+    load, largest = view.load.values, float(view.load.values.max())
+    reach = 2.0 * view.load.largest * view.load.quiet_noise
+    is_top = (load >= largest - reach) & ~bad
+    long = [(a, b) for a, b in zip(*runs_of(is_top), strict=True) if b - a > 2 * view.thresholds.few]
+    hidden = max((_rise_and_return(view, a, b - 1, reach) for a, b in long), default=0.0)
+    is_known = bool(np.any(np.abs(view.ends.loads - largest) <= reach))
+    return is_top & (hidden > 0.0 or is_known), hidden
+
+
+def _frozen(view: View, bad: Mask) -> Mask:
+    """(m,) samples of a load's channel that froze."""
+    load = view.load.values
+    is_frozen, smallest = np.zeros(load.size, dtype=bool), float(load.min())
+    for first, last in zip(*runs_of((np.diff(load) == 0.0) & ~view.gap), strict=True):
+        is_long = last - first >= 2 * view.thresholds.few and not bad[first : last + 1].any()
+        if is_long and load[first] != smallest and _is_frozen(view, first, last):
+            is_frozen[first : last + 1] = True
+    return is_frozen
 
 
 def _finding(view: View, kind: str, at: Mask, says: str) -> Finding:
     return Finding(kind, view.whole(at), says, masks=True, no_load=view.whole(at))
 
 
-def _rise_and_return(view: View, first: int, last: int) -> float:
+def _rise_and_return(view: View, first: int, last: int, reach: float) -> float:
     """By how much the reading rises above both of its values at the ends of a run of samples; 0 within the noise.
+
+    Within a ``reach`` of the load the run may have risen and fallen by itself.
 
     It is 0 as well where a load that is held explains it: the reading may overshoot and relax, to end farther from
     where it began than it rose, but does not move before the load's next move as it does after.
@@ -63,7 +84,7 @@ def _rise_and_return(view: View, first: int, last: int) -> float:
     y, given = view.reading.values, view.thresholds
     inside = y[first : last + 1]
     begin, end = (float(np.median(part)) for part in (inside[: given.few], inside[-given.few :]))
-    noise = view.reading.largest * view.reading.quiet_noise
+    noise = view.reading.largest * view.reading.quiet_noise + view.gain * reach
     rise = float(inside.max()) - max(begin, end)
     if rise <= max(abs(end - begin), noise + given.standing * view.span):
         return 0.0

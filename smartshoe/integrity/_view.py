@@ -127,13 +127,17 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Values, as recorded, to which a unit's sensor drops out, ``dropouts`` (d,), and where it ends, ``rails`` (r,)."""
+    """Values, as recorded, to which a unit's sensor drops out, ``dropouts`` (d,), and where it ends, ``rails`` (r,).
+
+    ``loads`` (l,): where its load cell ends, in N.
+    """
 
     dropouts: Array
     rails: Array
+    loads: Array
 
 
-UNKNOWN_ENDS = Ends(np.zeros(0), np.zeros(0))
+UNKNOWN_ENDS = Ends(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
