@@ -52,8 +52,10 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
 def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``dropouts``; masked: the load falls to nothing and comes back while the reading stands.
 
-    A reading that lags may still rise when the load falls, so its fall is taken from its highest value so far. A load
-    that often falls to that level, as one that is switched on and off, has not dropped out.
+    A reading that lags may still rise when the load falls, so its fall is taken from its highest value so far. Where a
+    noisy load takes one value throughout, which it does not at rest, the reading may fall by up to half (`clear`) of
+    what the static curve has it fall.
+    A load that often falls to that level, as one that is switched on and off, has not dropped out.
     """
     if view.span == 0.0 or view.load_span == 0.0:
         return
@@ -63,10 +65,24 @@ def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     for first, stop in zip(*runs_of(at), strict=True):
         comes_back = stop < reading.size and bool(swapped.jump[stop - 1] > 0.0)
         readings = reading[first - 1 : stop + 1]
-        at[first:stop] = comes_back and float(np.max(np.maximum.accumulate(readings) - readings)) < standing_limit
+        is_one = _is_no_load(view, view.load.values[first:stop])
+        fall = float(view.expected[first - 1] - view.expected[first]) if is_one else 0.0
+        limit = max(standing_limit, fall / view.thresholds.clear)
+        at[first:stop] = comes_back and float(np.max(np.maximum.accumulate(readings) - readings)) < limit
+    if at.any() and _is_no_load(view, view.load.values[at]):
+        at = view.load.values == view.load.values[at][0]  # also where it falls from little
     if not at.any() or not _falls_to_one_level(swapped, at) or _often_falls_there(swapped, at):
         return
     yield replace(_finding(swapped, at, np.zeros(0)), no_load=view.whole(at))
+
+
+def _is_no_load(view: View, loads: Array) -> bool:
+    """Whether ``loads`` (k,) are one value that a noisy load takes only by a fault, and not in most of its rests."""
+    if not view.load.is_noisy or np.ptp(loads) > 0.0:
+        return False
+    load, lowest = view.load.values, float(view.curve[0][0])
+    is_low = load < lowest + view.thresholds.standing * view.load_span
+    return bool(view.thresholds.clear * np.count_nonzero(load == loads[0]) < np.count_nonzero(is_low))
 
 
 def _with_more_at_values(view: View, at: Mask, known: Array) -> tuple[Mask, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._view import View
+from smartshoe.integrity._view import Signal, View
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
 
@@ -18,9 +18,11 @@ from smartshoe.signals.masks import runs_of
 def still_load(view: View, bad: Mask) -> Iterator[Finding]:
     """Kinds ``saturation`` and ``held_samples``; masked: the load stands while the reading goes on.
 
-    At its largest value the load cell is at the end of its range; at another, repeated exactly, its channel froze. At
+    At its largest value the load cell is at the end of its range; at another its channel froze. At
     its smallest value the load may be nothing, whatever the unit reads then.
     """
+    if Signal(view.recording.load.values[view.index], view.thresholds).is_switched:  # on its own clock
+        return
     at_end, hidden = _at_the_cells_end(view, bad)
     if at_end.any():
         largest = float(view.load.values.max())
@@ -28,8 +30,8 @@ def still_load(view: View, bad: Mask) -> Iterator[Finding]:
         says = (
             f"the load stands at its largest value, {largest:.6g} N, at {int(at_end.sum())} samples"
             f" ({percent(float(at_end.mean()))}){meanwhile if hidden > 0.0 else ', as in another recording'}: the load"
-            " cell or its converter saturates there; these samples are left out, and what the unit remembers of them is not"
-            " known: record again with a larger range"
+            " cell or its converter saturates there; these samples are left out, and what the unit remembers of them is"
+            " not known: record again with a larger range"
         )
         yield replace(_finding(view, "saturation", at_end, says), load_end=largest)
     frozen = _frozen(view, bad | at_end)
@@ -37,7 +39,7 @@ def still_load(view: View, bad: Mask) -> Iterator[Finding]:
         starts, stops = runs_of(frozen)
         longest_s = float(np.max(view.time_s[stops - 1] - view.time_s[starts]))
         says = (
-            f"the load repeats one value for up to {longest_s:.3g} s while the reading goes through much of its span:"
+            f"the load stands at one value for up to {longest_s:.3g} s while the reading goes through much of its span:"
             f" its channel froze; {int(frozen.sum())} samples are left out, and what the unit remembers of them is not"
             " known: find what froze"
         )
@@ -50,7 +52,7 @@ def _at_the_cells_end(view: View, bad: Mask) -> tuple[Mask, float]:
     One run of them that shows it, here or in another recording, tells it of all: also of holds beyond that end.
     """
     load, largest = view.load.values, float(view.load.values.max())
-    reach = 2.0 * view.load.largest * view.load.quiet_noise
+    reach = _reach(view)
     is_top = (load >= largest - reach) & ~bad
     long = [(a, b) for a, b in zip(*runs_of(is_top), strict=True) if b - a > 2 * view.thresholds.few]
     hidden = max((_rise_and_return(view, a, b - 1, reach) for a, b in long), default=0.0)
@@ -59,14 +61,35 @@ def _at_the_cells_end(view: View, bad: Mask) -> tuple[Mask, float]:
 
 
 def _frozen(view: View, bad: Mask) -> Mask:
-    """(m,) samples of a load's channel that froze."""
-    load = view.load.values
+    """(m,) samples of a load's channel that froze: it stands within its noise."""
+    load, reach = view.load.values, _reach(view)
     is_frozen, smallest = np.zeros(load.size, dtype=bool), float(load.min())
-    for first, last in zip(*runs_of((np.diff(load) == 0.0) & ~view.gap), strict=True):
-        is_long = last - first >= 2 * view.thresholds.few and not bad[first : last + 1].any()
-        if is_long and load[first] != smallest and _is_frozen(view, first, last):
-            is_frozen[first : last + 1] = True
-    return is_frozen
+    breaks_off = np.append(False, view.gap | (np.abs(np.diff(load)) > reach))
+    stands = _stands(load, 2 * view.thresholds.few + 1, reach) & ~breaks_off
+    for first, stop in zip(*runs_of(stands), strict=True):
+        level = float(np.median(load[first:stop]))
+        near = first + np.flatnonzero(np.abs(load[first:stop] - level) <= reach)  # without the end of a ramp beside it
+        is_level = near.size > (1.0 - view.thresholds.faulty_share) * (stop - first)
+        if is_level and _is_frozen(view, int(near[0]), int(near[-1]), bad, may_be_nothing=level <= smallest + reach):
+            is_frozen[near] = True
+    return is_frozen & ~bad
+
+
+def _reach(view: View) -> float:
+    """By how much the load's noise may move it, from its least to its most, in N; 0 where more than standing still.
+
+    A load that is noisier stands where it repeats one value.
+    """
+    reach = 2.0 * view.load.largest * view.load.quiet_noise
+    return reach if reach <= view.thresholds.standing * view.load_span else 0.0
+
+
+def _stands(load: Array, width: int, reach: float) -> Mask:
+    """(m,) samples in ``width`` samples of the load (m,) that lie within ``reach`` of one another."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    within = maximum_filter1d(load, width, mode="nearest") - minimum_filter1d(load, width, mode="nearest") <= reach
+    return np.asarray(maximum_filter1d(within.astype(np.uint8), width, mode="constant").astype(bool))
 
 
 def _finding(view: View, kind: str, at: Mask, says: str) -> Finding:
@@ -76,13 +99,12 @@ def _finding(view: View, kind: str, at: Mask, says: str) -> Finding:
 def _rise_and_return(view: View, first: int, last: int, reach: float) -> float:
     """By how much the reading rises above both of its values at the ends of a run of samples; 0 within the noise.
 
-    Within a ``reach`` of the load the run may have risen and fallen by itself.
-
-    It is 0 as well where a load that is held explains it: the reading may overshoot and relax, to end farther from
-    where it began than it rose, but does not move before the load's next move as it does after.
+    Within a ``reach`` the load may have risen and fallen itself. It is 0 as well where a load that is held explains it:
+    the reading may overshoot and relax, to end farther from where it began than it rose, but does not move before the
+    load's next move as it does after.
     """
     y, given = view.reading.values, view.thresholds
-    inside = y[first : last + 1]
+    inside = _without_spikes(view, y[first : last + 1])
     begin, end = (float(np.median(part)) for part in (inside[: given.few], inside[-given.few :]))
     noise = view.reading.largest * view.reading.quiet_noise + view.gain * reach
     rise = float(inside.max()) - max(begin, end)
@@ -94,17 +116,30 @@ def _rise_and_return(view: View, first: int, last: int, reach: float) -> float:
     return rise if begins and ends else 0.0
 
 
-def _is_frozen(view: View, first: int, last: int) -> bool:
+def _is_frozen(view: View, first: int, last: int, bad: Mask, *, may_be_nothing: bool) -> bool:
     """Whether the reading goes through at least half (`clear`) of its span in a run, as under no load that is held.
 
-    It does so to and fro, and turns more often than an overshoot's once; or the load jumps at the end of the run as the
-    reading does not.
+    Under a load that is held a reading moves at once, if slowly, and turns once at most, as it overshoots. So it turns
+    twice, if the load is not such that it ``may_be_nothing`` while the unit bears another; or it turns, or has stood
+    before it moves, and the load then jumps as the reading does not. Readings that are ``bad`` (m,) tell nothing.
     """
-    inside, half = view.reading.values[first : last + 1], view.span / view.thresholds.clear
-    if np.ptp(inside) < half:
+    given, half = view.thresholds, view.span / view.thresholds.clear
+    inside = _without_spikes(view, view.reading.values[first : last + 1][~bad[first : last + 1]])
+    if inside.size == 0 or np.ptp(inside) < half:
         return False
-    ends_in_a_jump = last < view.load.values.size - 1 and view.swapped().jump[last] != 0.0
-    return bool(ends_in_a_jump or len(turning_points(inside, half)[1:-1]) > 1)
+    turns = len(turning_points(inside, half)[1:-1])
+    if turns > 1 and not may_be_nothing:
+        return True
+    soon = inside[: 1 + round(given.settled_s / view.step_s)]
+    jumps = last < view.load.values.size - 1 and view.swapped().jump[last] != 0.0
+    return bool(jumps and (turns > 0 or np.ptp(soon) < given.standing * view.span))
+
+
+def _without_spikes(view: View, readings: Array) -> Array:
+    """(k,) running medians of ``readings``."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(readings, 2 * view.thresholds.few + 1, mode="nearest"))
 
 
 def _is_one_move(before: Array, after: Array, clear: float) -> bool:

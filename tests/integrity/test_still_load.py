@@ -50,13 +50,15 @@ def test_holds_beyond_a_load_cells_end_are_left_out_too_also_of_other_recordings
 
 
 @settings(max_examples=12)
-@given(SEEDS, NOISES_PERCENT, st.floats(0.1, 0.5), st.floats(22.0, 40.0))
-def test_a_load_channel_that_freezes_under_cycles_is_told(seed, noise_percent, begins, lasts_s):
+@given(SEEDS, NOISES_PERCENT, st.floats(0.1, 0.5), st.floats(22.0, 40.0), st.sampled_from([0.0, 0.2]))
+def test_a_load_channel_that_freezes_under_cycles_is_told(seed, noise_percent, begins, lasts_s, noise_n):
+    """It repeats one value, or an amplifier lets go of its bridge, and its noise is logged about that value."""
     whole = recorded(dynamic_protocol((100.0, 200.0), repeats=3), seed, noise_percent)
     start = int(begins * len(whole))
     start += int(np.argmax(whole.force_n[start:] > 0.3 * whole.force_n.max()))  # not while it rests at its least
     frozen = (np.arange(len(whole)) >= start) & (whole.time_s < whole.time_s[start] + lasts_s)
-    found = examine([with_load(whole, np.where(frozen, whole.force_n[start], whole.force_n))])
+    level_n = whole.force_n[start] + noise_n * np.random.default_rng(seed).standard_normal(len(whole))
+    found = examine([with_load(whole, np.where(frozen, level_n, whole.force_n))])
     assert kinds(found) == {"held_samples"}
     assert "its channel froze" in found.faults[0].says
     assert (~found.usable[0])[frozen].mean() > 0.95
@@ -76,6 +78,17 @@ def test_a_commanded_load_that_is_held_stands_as_it_should(protocol: Protocol, l
     reading = 0.1 * (late + 0.2 * (late - wall)) + 0.03 * np.random.default_rng(0).standard_normal(load.size)
     one = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=reading)
     assert not [fault for fault in examine([one]).faults if "the load" in fault.says]
+
+
+@pytest.mark.parametrize("frozen_s", [(13.0, 20.0), (5.0, 12.0)])
+def test_a_channel_that_froze_in_a_rest_or_a_hold_jumps_to_where_the_load_has_gone(frozen_s) -> None:
+    """From a rest into the way to the next hold, from a hold into the rest after it."""
+    whole = recorded(static_protocol((800.0, 800.0), rate_n_per_s=400.0, approach_s=1.0), 6)
+    frozen = (whole.time_s >= frozen_s[0]) & (whole.time_s < frozen_s[1])
+    first = whole.force_n[int(np.argmax(frozen))]
+    found = examine([with_load(whole, np.where(frozen, first, whole.force_n))])
+    assert [fault.kind for fault in found.faults] == ["held_samples"]
+    assert (~found.usable[0])[frozen].all()
 
 
 def test_a_unit_that_is_disturbed_while_nothing_is_on_it_has_a_sound_load() -> None:
