@@ -209,6 +209,19 @@ def limit_relaxation_range(
     ]
 
 
+def limit_early(model: ExtendedModel, names: Sequence[Name]) -> list[str]:
+    """Sentences on named latencies by which the reading is early."""
+    latencies = [one.effect.name for one in names if one.effect.is_latency]
+    early_s = ((one.name, -one.effect.late_s(one.values, 0.0)) for one in model.parts if one.name in latencies)
+    return [
+        f"the reading comes {1e3 * by_s:.3g} ms before the load ({in_words(name)}): no unit answers a load before it is"
+        " there, so that the load is late, by a filter of its cell or by its clock (filter both alike, or log both by"
+        " one device)"
+        for name, by_s in early_s
+        if by_s > 0.0
+    ]
+
+
 def limit_curve_range(model: ExtendedModel, names: Sequence[Name] = ()) -> list[str]:
     """The sentence on a curve at the end of its range, in the model or as the law that names a block."""
     if ended := [part.name for part in model.parts if part.bends_too_little]:
@@ -398,8 +411,8 @@ def limit_zero_jumps(changes: Sequence[ZeroChange]) -> list[str]:
         return []
     return [
         f"the zero jumps, in shares of full scale, {_when(changes)}, for example because the unit slips, water moves in"
-        " a line or the room warms: jumps that are not seen may imitate any effect of the unit, so that none is more"
-        " than half sure; no model can predict the jumps of another recording"
+        " a line, or the load cell jumps: jumps that are not seen may imitate any effect of the unit, so that none is"
+        " more than half sure; no model can predict the jumps of another recording"
     ]
 
 

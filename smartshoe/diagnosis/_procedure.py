@@ -29,6 +29,7 @@ from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._limits import (
     SAID,
     limit_curve_range,
+    limit_early,
     limit_held_out_excess,
     limit_nearest_law,
     limit_own_gains,
@@ -398,6 +399,7 @@ def _limits_of_the_names(
     """What limits the names: effects that are no causes, models at the end of their range, refused effects."""
     return (
         *named.limits,
+        *limit_early(extended, named.names),
         *limit_relaxation_range(extended, given.sessions, given.thresholds, beside_names=bool(named.names)),
         *limit_curve_range(extended, named.names),
         *limit_wall_ratio(extended, given.sessions, given.thresholds),

@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask, require_positive
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.display import Summarised, SummaryTable, panels, significant, sure
+from smartshoe.display import Summarised, SummaryTable, panels, percent, significant, sure
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, described
@@ -92,7 +92,7 @@ def likelier_of(rivals: Sequence[Rival], equivalents: Sequence[str]) -> tuple[Ri
     return tuple(one for one in rivals if one.may_be_likelier and one.effect not in equivalents)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cause:
     """One named effect. ``size`` is the rms by which it moves the reading, a share of full scale.
 
@@ -112,6 +112,16 @@ class Cause:
     size: float
     rivals: tuple[Rival, ...] = ()
     part: str | None = None
+
+    def __repr__(self) -> str:
+        """One line: the effect, how sure it is, its size and its parameters."""
+        name = listed([self.name, *self.equivalents], "or")
+        values = ", ".join(
+            f"{key} {significant(one.value)}" + (f" {one.unit}" if one.unit != "1" else "")
+            for key, one in self.parameters.items()
+        )
+        size = f"moves the reading by {percent(self.size)} of full scale"
+        return f"<Cause {name}, {sure(self.confidence)} sure: {size}; {values}>"
 
     @property
     def name(self) -> str:

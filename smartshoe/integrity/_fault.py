@@ -39,6 +39,11 @@ class DataFault:
     error: float = 0.0
     lines_hz: tuple[float, ...] = ()
 
+    def __str__(self) -> str:
+        """What is wrong, and where."""
+        where = self.to_dict()["where"]
+        return f"{self.kind.replace('_', ' ')}, {where}: {self.says}"
+
     def to_dict(self) -> dict[str, Any]:
         """The object that ``diagnose --json`` lists under ``data_faults``."""
         where = f"{self.label}, {moment(self.start_s)}-{moment(self.stop_s)} s"

@@ -20,6 +20,7 @@ from smartshoe.diagnosis._inference import _validated
 from smartshoe.diagnosis._limits import (
     limit_clocks_disagree,
     limit_curves_in_tare,
+    limit_early,
     limit_held_out_excess,
     limit_own_gains,
     limit_rejected,
@@ -488,13 +489,25 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     )
 
 
+def test_a_reading_that_is_early_is_the_loads_being_late() -> None:
+    drift = effect("zero_drift").start({})
+    model = MODEL.with_part("zero_drift", drift).with_part("delay", np.array([-0.0174]))
+    (said,) = limit_early(model, [_named("zero_drift"), _named("delay")])
+    assert said.startswith(
+        "the reading comes 17.4 ms before the load (delay): no unit answers a load before it is there"
+    )
+    assert limit_early(model, [_named("zero_drift")]) == []  # in the model, and no cause
+    assert limit_early(MODEL.with_part("delay", np.array([0.0174])), [_named("delay")]) == []
+
+
 def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
     changes = [ZeroChange("a", 7.5 * k, 0.03 / k) for k in range(1, 7)]
     (said,) = limit_zero_jumps(changes)
     assert said.startswith(
         "the zero jumps, in shares of full scale, by +3 % at 7.5 s in a, by +1.5 % at 15 s in a, by +1 % at 22.5 s in"
-        " a, by +0.75 % at 30 s in a and 2 more, for example because the unit slips, water moves in a line or the room"
-        " warms: jumps that are not seen may imitate any effect of the unit, so that none is more than half sure;"
+        " a, by +0.75 % at 30 s in a and 2 more, for example because the unit slips, water moves in a line, or the"
+        " load cell jumps: jumps that are not seen may imitate any effect of the unit, so that none is more than half"
+        " sure;"
     )
     (late,) = limit_zero_jumps([ZeroChange("a", 1_700_000_007.54, 0.03)])
     assert "by +3 % at 1700000007.5 s in a" in late

@@ -162,6 +162,9 @@ def test_without_the_cause_the_error_is_what_it_would_be(found: Diagnosis) -> No
     assert margins == sorted(margins)
     assert said["margin to the nearest rival"].value == margins[0]
     assert cause.rivals[0].effect.replace("_", " ") in said["margin to the nearest rival"].says
+    lost_n = cause.parameters["lost_load"].value
+    assert repr(cause).startswith(f"<Cause dead band, over 99 % sure: moves the reading by {100 * cause.size:.2g} % of")
+    assert f"; lost_load {lost_n:.4g} N, " in repr(cause)
 
 
 def test_an_offset_that_is_taken_away_is_an_error_of_its_size(found: Diagnosis) -> None:
