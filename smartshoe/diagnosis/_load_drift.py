@@ -14,10 +14,11 @@ from smartshoe.models.extended import ExtendedModel
 def may_be_of_the_load_cell(
     name: Name, model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
 ) -> bool:
-    """Whether, at rest, the logged load moves by half (``clear``) or more of what ``name`` takes the reading's zero by.
+    """Whether, at rest, the logged load moves by what ``name`` takes the reading's zero the other way, or so (``clear``).
 
     Such an effect only undoes there what the load cell shows of an unloaded machine, and the reading stays: a zero that
-    moves in the reading moves no load.
+    moves in the reading moves no load. A load that moves by far more is no shadow of the effect; one that changes the
+    gain changes the reading by a share of it.
     """
     moved = total = count = 0.0
     for one in fitted_of(sessions):
@@ -27,4 +28,5 @@ def may_be_of_the_load_cell(
         shift = model.simulate(one.conditions) - model.without(name.member.name).simulate(one.conditions)
         shift, load = (values[at] - values[at].mean() for values in (shift, model.gain * one.conditions.load))
         moved, total, count = moved - float(load @ shift), total + float(shift @ shift), count + int(at.sum())
-    return total > thresholds.material**2 * count and thresholds.clear * moved > total
+    is_material = total > thresholds.material**2 * count
+    return is_material and total < thresholds.clear * moved < thresholds.clear**2 * total

@@ -33,7 +33,9 @@ def _asked(load: Array, drift: float) -> bool:
     return may_be_of_the_load_cell(name, model, [session], STANDARD)
 
 
-@pytest.mark.parametrize(("share", "is_cells"), [(1.0, True), (0.7, True), (0.3, False), (0.0, False), (-1.0, False)])
+@pytest.mark.parametrize(
+    ("share", "is_cells"), [(1.0, True), (0.7, True), (0.3, False), (0.0, False), (-1.0, False), (3.0, False)]
+)
 @given(st.floats(0.002, 0.03), st.sampled_from([-1.0, 1.0]))
 def test_it_is_the_load_cells_where_the_load_at_rest_moves_as_the_drift_has_it(
     share: float, is_cells: bool, drift: float, way: float
