@@ -14,7 +14,7 @@ from smartshoe.models.extended import ExtendedModel
 def may_be_of_the_load_cell(
     name: Name, model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
 ) -> bool:
-    """Whether, at rest, the logged load moves by what ``name`` takes the reading's zero the other way, or so (``clear``).
+    """Whether, at rest, the logged load moves by about what ``name`` takes the zero the other way (``clear``).
 
     Such an effect only undoes there what the load cell shows of an unloaded machine, and the reading stays: a zero that
     moves in the reading moves no load. A load that moves by far more is no shadow of the effect; one that changes the
