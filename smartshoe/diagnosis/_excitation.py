@@ -215,7 +215,13 @@ def _still(session: Session, thresholds: Thresholds) -> Mask:
     conditions, largest = session.conditions, largest_of_noise(session.conditions.load.size, thresholds)
     if largest * math.sqrt(2.0) * conditions.load_noise <= thresholds.still_per_s * conditions.step_s:
         return np.asarray(np.abs(conditions.rate_per_s) < thresholds.still_per_s)
-    width = max(1, round(0.5 * thresholds.settled_s / conditions.step_s))
+    return _still_on_average(session, 0.5 * thresholds.settled_s, thresholds)
+
+
+def _still_on_average(session: Session, width_s: float, thresholds: Thresholds) -> Mask:
+    """(n,) True where means of the load over ``width_s`` before and after differ by no more than a held load's."""
+    conditions, largest = session.conditions, largest_of_noise(session.conditions.load.size, thresholds)
+    width = max(1, round(width_s / conditions.step_s))
     total, at = np.concatenate([[0.0], np.cumsum(conditions.load)]), np.arange(conditions.load.size)
     first, last = np.maximum(at + 1 - width, 0), np.minimum(at + 1 + width, at.size)
     before = (total[at + 1] - total[first]) / (at + 1 - first)
@@ -230,11 +236,17 @@ def stays_still(session: Session, thresholds: Thresholds) -> Mask:
     A load that changes at random from sample to sample is slow here and there, but never held. Where a few samples last
     no longer than a load takes to turn, the rate suffices, and all is True.
     """
+    load, few_s = session.conditions.load, math.ceil(thresholds.few / session.thinned) * session.conditions.step_s
+    if few_s <= _turning_s(thresholds):
+        return np.ones(load.size, dtype=bool)
+    return _within_standing(session, few_s, thresholds)
+
+
+def _within_standing(session: Session, width_s: float, thresholds: Thresholds) -> Mask:
+    """(n,) True in stretches of ``width_s`` within which the load stays within ``standing``."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    load, few = session.conditions.load, math.ceil(thresholds.few / session.thinned)
-    if few * session.conditions.step_s <= _turning_s(thresholds):
-        return np.ones(load.size, dtype=bool)
+    load, few = session.conditions.load, round(width_s / session.conditions.step_s)
     few = min(few + 1 - few % 2, load.size)  # odd, so that both filters are centred
     within = maximum_filter1d(load, few, mode="nearest") - minimum_filter1d(load, few, mode="nearest")
     stay = (within <= thresholds.standing).astype(np.uint8)
@@ -249,12 +261,24 @@ def _turning_s(thresholds: Thresholds) -> float:
 def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
     is_borne = ~session.resting & (session.conditions.load > thresholds.cycle)
-    return np.asarray(_still(session, thresholds) & stays_still(session, thresholds) & is_borne)
+    is_still = _still(session, thresholds) & stays_still(session, thresholds)
+    return np.asarray(is_borne & (is_still | _still_for_a_hold(session, thresholds)))
 
 
 def rested(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where there is no load and it does not move."""
-    return np.asarray(_still(session, thresholds) & session.resting)
+    return np.asarray(session.resting & (_still(session, thresholds) | _still_for_a_hold(session, thresholds)))
+
+
+def _still_for_a_hold(session: Session, thresholds: Thresholds) -> Mask:
+    """(n,) True where the load does not move for the time of a hold but by what averages out over it.
+
+    Hum, and noise that is correlated over time, move a held load for moments. A slow log has too few samples in a hold.
+    """
+    if thresholds.hold_s < thresholds.few * session.conditions.step_s:
+        return np.zeros(session.resting.size, dtype=bool)
+    averages = _still_on_average(session, 0.5 * thresholds.hold_s, thresholds)
+    return averages & _within_standing(session, thresholds.hold_s, thresholds)
 
 
 def _inner_runs(mask: Mask) -> Mask:

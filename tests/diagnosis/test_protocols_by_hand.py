@@ -23,6 +23,7 @@ from smartshoe.diagnosis._excitation import (
     _held,
     _rises,
     excitation_of,
+    rested,
 )
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._session import DenoisedLoad, Session
@@ -499,3 +500,16 @@ def test_a_rise_that_the_recordings_end_cuts_off_has_no_peak_that_falls_with_tim
     assert not excitation_of([cut], STANDARD).goes_with_the_clock
     whole = _session(np.interp(np.arange(0.0, 120.0), 20.0 * np.arange(7), [*corners[:-1], 0.55, 0.0]), 0.1)
     assert excitation_of([whole], STANDARD).goes_with_the_clock
+
+
+@given(hz=st.floats(3.0, 20.0), size=st.floats(0.002, 0.008), phase=st.floats(0.0, 6.3))
+@settings(max_examples=20)
+def test_hum_on_the_load_hides_no_hold_and_no_rest(hz: float, size: float, phase: float) -> None:
+    time_s = 0.02 * np.arange(1500)
+    ramps = np.interp(time_s, [0.0, 8.0, 10.0, 20.0, 22.0, 30.0], [0.0, 0.0, 0.8, 0.8, 0.0, 0.0])
+    load = ramps + size * np.sin(2.0 * np.pi * hz * time_s + phase)
+    session = _session(load, 0.02, resting=ramps < 0.01)
+    held, at_rest = _held(session, STANDARD), rested(session, STANDARD)
+    assert held[(time_s > 12.0) & (time_s < 18.0)].all()
+    assert at_rest[(time_s > 2.0) & (time_s < 6.0)].all()
+    assert not held[(time_s > 8.5) & (time_s < 9.5)].any()
