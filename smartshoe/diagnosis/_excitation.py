@@ -17,7 +17,7 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import LATER_CYCLES
-from smartshoe.signals.masks import runs_of
+from smartshoe.signals.masks import level_stretches, runs_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,13 +244,9 @@ def stays_still(session: Session, thresholds: Thresholds) -> Mask:
 
 def _within_standing(session: Session, width_s: float, thresholds: Thresholds) -> Mask:
     """(n,) True in stretches of ``width_s`` within which the load stays within ``standing``."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     load, few = session.conditions.load, round(width_s / session.conditions.step_s)
-    few = min(few + 1 - few % 2, load.size)  # odd, so that both filters are centred
-    within = maximum_filter1d(load, few, mode="nearest") - minimum_filter1d(load, few, mode="nearest")
-    stay = (within <= thresholds.standing).astype(np.uint8)
-    return np.asarray(maximum_filter1d(stay, few, mode="constant").astype(bool))
+    few = min(few + 1 - few % 2, load.size)  # odd, so that the filters are centred
+    return level_stretches(load, few, thresholds.standing)
 
 
 def _turning_s(thresholds: Thresholds) -> float:

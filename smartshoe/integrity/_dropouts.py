@@ -54,8 +54,8 @@ def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
 
     A reading that lags may still rise when the load falls, so its fall is taken from its highest value so far. Where a
     noisy load takes one value throughout, which it does not at rest, the reading may fall by up to half (`clear`) of
-    what the static curve has it fall.
-    A load that often falls to that level, as one that is switched on and off, has not dropped out.
+    what the static curve has it fall. A load that often falls to that level, as one that is switched on and off, has
+    not dropped out.
     """
     if view.span == 0.0 or view.load_span == 0.0:
         return

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.display import percent
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import Signal, View
 from smartshoe.signals.loading import turning_points
-from smartshoe.signals.masks import runs_of
+from smartshoe.signals.masks import level_stretches, runs_of
 
 
 def still_load(view: View, bad: Mask) -> Iterator[Finding]:
     """Kinds ``saturation`` and ``held_samples``; masked: the load stands while the reading goes on.
 
-    At its largest value the load cell is at the end of its range; at another its channel froze. At
-    its smallest value the load may be nothing, whatever the unit reads then.
+    At its largest value the load cell is at the end of its range; at another its channel froze. A load that is switched
+    between a few levels stands and jumps for good reasons.
     """
     if Signal(view.recording.load.values[view.index], view.thresholds).is_switched:  # on its own clock
         return
@@ -65,12 +65,13 @@ def _frozen(view: View, bad: Mask) -> Mask:
     load, reach = view.load.values, _reach(view)
     is_frozen, smallest = np.zeros(load.size, dtype=bool), float(load.min())
     breaks_off = np.append(False, view.gap | (np.abs(np.diff(load)) > reach))
-    stands = _stands(load, 2 * view.thresholds.few + 1, reach) & ~breaks_off
+    stands = level_stretches(load, 2 * view.thresholds.few + 1, reach) & ~breaks_off
+    swapped = view.swapped()
     for first, stop in zip(*runs_of(stands), strict=True):
         level = float(np.median(load[first:stop]))
         near = first + np.flatnonzero(np.abs(load[first:stop] - level) <= reach)  # without the end of a ramp beside it
         is_level = near.size > (1.0 - view.thresholds.faulty_share) * (stop - first)
-        if is_level and _is_frozen(view, int(near[0]), int(near[-1]), bad, may_be_nothing=level <= smallest + reach):
+        if is_level and _is_frozen(view, swapped, near, bad, may_be_nothing=level <= smallest + reach):
             is_frozen[near] = True
     return is_frozen & ~bad
 
@@ -82,14 +83,6 @@ def _reach(view: View) -> float:
     """
     reach = 2.0 * view.load.largest * view.load.quiet_noise
     return reach if reach <= view.thresholds.standing * view.load_span else 0.0
-
-
-def _stands(load: Array, width: int, reach: float) -> Mask:
-    """(m,) samples in ``width`` samples of the load (m,) that lie within ``reach`` of one another."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
-    within = maximum_filter1d(load, width, mode="nearest") - minimum_filter1d(load, width, mode="nearest") <= reach
-    return np.asarray(maximum_filter1d(within.astype(np.uint8), width, mode="constant").astype(bool))
 
 
 def _finding(view: View, kind: str, at: Mask, says: str) -> Finding:
@@ -116,14 +109,16 @@ def _rise_and_return(view: View, first: int, last: int, reach: float) -> float:
     return rise if begins and ends else 0.0
 
 
-def _is_frozen(view: View, first: int, last: int, bad: Mask, *, may_be_nothing: bool) -> bool:
-    """Whether the reading goes through at least half (`clear`) of its span in a run, as under no load that is held.
+def _is_frozen(view: View, swapped: View, at: Index, bad: Mask, *, may_be_nothing: bool) -> bool:
+    """Whether the reading goes through at least half (`clear`) of its span ``at`` (k,), as under no load that is held.
 
     Under a load that is held a reading moves at once, if slowly, and turns once at most, as it overshoots. So it turns
     twice, if the load is not such that it ``may_be_nothing`` while the unit bears another; or it turns, or has stood
-    before it moves, and the load then jumps as the reading does not. Readings that are ``bad`` (m,) tell nothing.
+    before it moves, and the load (the reading of ``swapped``) then jumps as the reading does not. Readings that are
+    ``bad`` (m,) tell nothing.
     """
     given, half = view.thresholds, view.span / view.thresholds.clear
+    first, last = int(at[0]), int(at[-1])
     inside = _without_spikes(view, view.reading.values[first : last + 1][~bad[first : last + 1]])
     if inside.size == 0 or np.ptp(inside) < half:
         return False
@@ -131,7 +126,7 @@ def _is_frozen(view: View, first: int, last: int, bad: Mask, *, may_be_nothing: 
     if turns > 1 and not may_be_nothing:
         return True
     soon = inside[: 1 + round(given.settled_s / view.step_s)]
-    jumps = last < view.load.values.size - 1 and view.swapped().jump[last] != 0.0
+    jumps = last < view.load.values.size - 1 and swapped.jump[last] != 0.0
     return bool(jumps and (turns > 0 or np.ptp(soon) < given.standing * view.span))
 
 

@@ -21,3 +21,11 @@ def bridged(time_s: Array, values: Array, present: Mask) -> Array:
     if present.all() or not present.any():
         return np.array(values, dtype=float)
     return np.interp(time_s, time_s[present], values[present])
+
+
+def level_stretches(values: Array, width: int, reach: float) -> Mask:
+    """(n,) True in stretches of ``width`` samples, an odd number, of ``values`` (n,) that lie within ``reach``."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    within = maximum_filter1d(values, width, mode="nearest") - minimum_filter1d(values, width, mode="nearest")
+    return np.asarray(maximum_filter1d((within <= reach).astype(np.uint8), width, mode="constant").astype(bool))
