@@ -29,9 +29,9 @@ def still_load(view: View, bad: Mask) -> Iterator[Finding]:
         meanwhile = f" while the reading rises on and comes back, by up to {percent(hidden / view.span)} of its span"
         says = (
             f"the load stands at its largest value, {largest:.6g} N, at {int(at_end.sum())} samples"
-            f" ({percent(float(at_end.mean()))}){meanwhile if hidden > 0.0 else ', as in another recording'}: the load"
-            " cell or its converter saturates there; these samples are left out, and what the unit remembers of them is"
-            " not known: record again with a larger range"
+            f"{meanwhile if hidden > 0.0 else ', as in another recording'}: the load cell or its converter saturates"
+            " there; these samples are left out, and what the unit remembers of them is not known: record again with a"
+            " larger range"
         )
         yield replace(_finding(view, "saturation", at_end, says), load_end=largest)
     frozen = _frozen(view, bad | at_end)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from smartshoe.models.effects import blocks
 from smartshoe.protocol import Protocol
-from smartshoe.report.diagnosis._charts import faults, over_cycles, protocol
+from smartshoe.report.diagnosis._charts import faults, over_cycles, over_time, protocol
 from smartshoe.report.diagnosis._protocol_file import protocol_text
 from smartshoe.report.diagnosis.grids import ranked
 from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_at_two_rates, spectrum, worst_cycle
@@ -135,3 +135,17 @@ def test_few_samples_fall_into_few_bins_and_are_seen() -> None:
     assert np.isfinite(binned(x[::2], x[::2], edges).mean).all()
     assert edges_of(np.linspace(0.0, 1.0, 10_000)).size - 1 == 24
     assert edges_of(x[:8]).size - 1 == 4
+
+
+@pytest.mark.parametrize(("left_out", "gaps"), [(slice(0, 0), 0), (slice(200, 203), 0), (slice(200, 300), 1)])
+def test_the_error_over_time_is_broken_where_samples_are_left_out_for_as_long_as_is_seen(
+    left_out: slice, gaps: int
+) -> None:
+    trace, _ = traces_of(("leak",), ("leak",))
+    usable = trace.usable.copy()
+    usable[left_out] = False
+    found = evidence([replace(trace, usable=usable)], FULL_LOAD_N)
+    assert found is not None
+    for panel in over_time(found, "mbar").panels:
+        for line in panel.lines:
+            assert np.count_nonzero(np.isnan(line.values)) == gaps

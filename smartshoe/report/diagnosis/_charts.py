@@ -30,6 +30,7 @@ BEFORE, AFTER = "raw", "corrected"
 WAYS = ((1, "loading", "line"), (-1, "unloading", "dashed"))
 MOST_RECORDINGS = 6  # whose faults are drawn
 LOOP_POINTS = 120
+SEEN_SHARE = 0.005  # of a chart's width: a longer gap is seen
 
 
 def _residuals(found: EvidenceView) -> list[tuple[str, str, Array]]:
@@ -55,12 +56,18 @@ def _line(label: str, colour: str, found: Binned, dashed: bool = False) -> Line:
     return Line(label, found.mean, colour, style, low=found.mean - found.sd, high=found.mean + found.sd)
 
 
+def _broken(time_s: Array, values: Array) -> Array:
+    """``values`` (n,) with lines broken where samples are left out, or missing, for as long as a chart shows."""
+    steps_s = np.diff(time_s, prepend=time_s[0])
+    return np.where(steps_s > max(SEEN_SHARE * np.ptp(time_s), 3.0 * np.median(steps_s)), np.nan, values)
+
+
 def over_time(found: EvidenceView, unit: str) -> Chart:
     """The error of all recordings, one after the other, before and after on a common scale, below the load."""
     limits = _limits(found.before)
-    panels = [Panel("load (N)", [Line("load", found.load_n, "load")], height=90)]
+    panels = [Panel("load (N)", [Line("load", _broken(found.time_s, found.load_n), "load")], height=90)]
     panels += [
-        Panel(f"{label} ({unit})", [Line(label, residual, colour)], limits, 150)
+        Panel(f"{label} ({unit})", [Line(label, _broken(found.time_s, residual), colour)], limits, 150)
         for label, colour, residual in _residuals(found)
     ]
     judged = found.held_out
