@@ -119,8 +119,11 @@ def _is_frozen(view: View, swapped: View, at: Index, bad: Mask, *, may_be_nothin
     """
     given, half = view.thresholds, view.span / view.thresholds.clear
     first, last = int(at[0]), int(at[-1])
-    inside = _without_spikes(view, view.reading.values[first : last + 1][~bad[first : last + 1]])
-    if inside.size == 0 or np.ptp(inside) < half:
+    inside = view.reading.values[first : last + 1][~bad[first : last + 1]]
+    if inside.size == 0 or np.ptp(inside) < half:  # as in most runs, before spikes are looked for
+        return False
+    inside = _without_spikes(view, inside)
+    if np.ptp(inside) < half:
         return False
     turns = len(turning_points(inside, half)[1:-1])
     if turns > 1 and not may_be_nothing:
