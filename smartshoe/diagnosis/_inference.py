@@ -433,8 +433,8 @@ def _best_single(initial: State, plain: Fit, sessions: Sequence[Session]) -> tup
         if not is_likelier and error_of(sessions, one.fit.model) > thresholds.tolerable:
             continue
         validated = _validated(one, plain, sessions)
-        removed = before**2 - error_of(sessions, validated.fit.model) ** 2
-        if not validated.is_reduced and removed > thresholds.tolerable**2:
+        left = error_of(sessions, validated.fit.model)
+        if not validated.is_reduced and not is_tolerable(before, left, thresholds):
             standing.append((initial.linearisation.candidates[k].effect, validated))
     return min(standing, key=lambda one: float(left_out.errors(one[1].fit.model).sum()), default=None)
 

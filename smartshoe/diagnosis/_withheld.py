@@ -57,6 +57,11 @@ class NamedCauses:
         kept = tuple(one for one, said in zip(self.names, reasons, strict=True) if said is None)
         return replace(self, names=kept, limits=(*self.limits, *(said for said in reasons if said is not None)))
 
+    def with_doubt(self, doubt: str, unsure: Sequence[Name], limits: Sequence[str]) -> NamedCauses:
+        """The same with the ``unsure`` names half sure at most, for a ``doubt`` that ``limits`` tell more of."""
+        names = tuple(capped_at_half(one, doubt) if one in unsure else one for one in self.names)
+        return replace(self, names=names, limits=(*self.limits, *limits))
+
 
 def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], residual_rms: float) -> NamedCauses:
     """The causes among the effects ``found`` and the ``zeros`` seen; ``residual_rms``: structure without an effect."""
@@ -65,8 +70,11 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], resid
     chosen = chosen.without(
         lambda one: reason_clocks_aligned(one) if given.is_moved and one.effect.is_latency else None
     )
-    chosen = _with_what_is_remembered(chosen, found, given)
-    chosen = _with_what_the_load_cell_does(chosen, found, given)
+    about = found.fit.model, given.sessions, thresholds
+    remembered = [one for one in chosen.names if may_be_remembered(one, *about)]
+    chosen = chosen.with_doubt(REMEMBERED, remembered, limit_remembered(remembered))
+    of_cell = [one for one in chosen.names if may_be_of_the_load_cell(one, *about)]
+    chosen = chosen.with_doubt(OF_THE_LOAD_CELL, of_cell, limit_load_cell_moves(of_cell))
     rivals = chosen.names
     chosen = chosen.without(lambda one: reason_departure(one, rivals, thresholds))
     cycles = load_cycles(given.sessions, thresholds)
@@ -106,22 +114,6 @@ def _with_gaps(zero: Zero, names: Sequence[Name], present: Collection[str]) -> Z
     words = {one.effect.name: told_apart_by(zero.effect, one.effect) for one in names}
     alike = (name for name, told_by in words.items() if told_by and told_by.isdisjoint(present))
     return replace(zero, alternatives=tuple(dict.fromkeys((*zero.alternatives, *alike))))
-
-
-def _with_what_is_remembered(chosen: NamedCauses, found: Inference, given: Prepared) -> NamedCauses:
-    """``chosen`` with those drifts half sure at most that may be a memory of loads before the recordings."""
-    about = found.fit.model, given.sessions, given.thresholds
-    unsure = [one for one in chosen.names if may_be_remembered(one, *about)]
-    names = tuple(capped_at_half(one, REMEMBERED) if one in unsure else one for one in chosen.names)
-    return replace(chosen, names=names, limits=(*chosen.limits, *limit_remembered(unsure)))
-
-
-def _with_what_the_load_cell_does(chosen: NamedCauses, found: Inference, given: Prepared) -> NamedCauses:
-    """``chosen`` with those effects half sure at most that only undo at rest what the load cell's zero does."""
-    about = found.fit.model, given.sessions, given.thresholds
-    unsure = [one for one in chosen.names if may_be_of_the_load_cell(one, *about)]
-    names = tuple(capped_at_half(one, OF_THE_LOAD_CELL) if one in unsure else one for one in chosen.names)
-    return replace(chosen, names=names, limits=(*chosen.limits, *limit_load_cell_moves(unsure)))
 
 
 def _shown(found: Inference, given: Prepared, residual_rms: float) -> NamedCauses:

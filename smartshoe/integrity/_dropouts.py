@@ -62,27 +62,28 @@ def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     swapped = view.swapped()
     at, reading = dropped(swapped), view.reading.values
     standing_limit = 2.0 * view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
+    lowest = float(view.curve[0][0])
+    low_count = int(np.count_nonzero(view.load.values < lowest + view.thresholds.standing * view.load_span))
     for first, stop in zip(*runs_of(at), strict=True):
         comes_back = stop < reading.size and bool(swapped.jump[stop - 1] > 0.0)
         readings = reading[first - 1 : stop + 1]
-        is_one = _is_no_load(view, view.load.values[first:stop])
+        is_one = _is_no_load(view, view.load.values[first:stop], low_count)
         fall = float(view.expected[first - 1] - view.expected[first]) if is_one else 0.0
         limit = max(standing_limit, fall / view.thresholds.clear)
         at[first:stop] = comes_back and float(np.max(np.maximum.accumulate(readings) - readings)) < limit
-    if at.any() and _is_no_load(view, view.load.values[at]):
+    if at.any() and _is_no_load(view, view.load.values[at], low_count):
         at = view.load.values == view.load.values[at][0]  # also where it falls from little
     if not at.any() or not _falls_to_one_level(swapped, at) or _often_falls_there(swapped, at):
         return
     yield replace(_finding(swapped, at, np.zeros(0)), no_load=view.whole(at))
 
 
-def _is_no_load(view: View, loads: Array) -> bool:
-    """Whether ``loads`` (k,) are one value that a noisy load takes only by a fault, and not in most of its rests."""
+def _is_no_load(view: View, loads: Array, low_count: int) -> bool:
+    """Whether ``loads`` (k,) are one value that a noisy load takes by a fault, not in most of ``low_count`` at rest."""
     if not view.load.is_noisy or np.ptp(loads) > 0.0:
         return False
-    load, lowest = view.load.values, float(view.curve[0][0])
-    is_low = load < lowest + view.thresholds.standing * view.load_span
-    return bool(view.thresholds.clear * np.count_nonzero(load == loads[0]) < np.count_nonzero(is_low))
+    levels, count = view.load.levels
+    return bool(view.thresholds.clear * count[np.searchsorted(levels, loads[0])] < low_count)
 
 
 def _with_more_at_values(view: View, at: Mask, known: Array) -> tuple[Mask, Array]:

@@ -26,12 +26,15 @@ def still_load(view: View, bad: Mask) -> Iterator[Finding]:
     at_end, hidden = _at_the_cells_end(view, bad)
     if at_end.any():
         largest = float(view.load.values.max())
-        meanwhile = f" while the reading rises on and comes back, by up to {percent(hidden / view.span)} of its span"
+        meanwhile = ", as in another recording"
+        if hidden > 0.0:
+            meanwhile = (
+                f" while the reading rises on and comes back, by up to {percent(hidden / view.span)} of its span"
+            )
         says = (
             f"the load stands at its largest value, {largest:.6g} N, at {int(at_end.sum())} samples"
-            f"{meanwhile if hidden > 0.0 else ', as in another recording'}: the load cell or its converter saturates"
-            " there; these samples are left out, and what the unit remembers of them is not known: record again with a"
-            " larger range"
+            f"{meanwhile}: the load cell or its converter saturates there; these samples are left out, and what the"
+            " unit remembers of them is not known: record again with a larger range"
         )
         yield replace(_finding(view, "saturation", at_end, says), load_end=largest)
     frozen = _frozen(view, bad | at_end)
