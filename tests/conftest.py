@@ -87,13 +87,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if "hardware" in item.keywords:
                 item.add_marker(skip)
-    off = {"bank": "a long bank", "benchmark": "figures against peers", "site": "builds the documentation"}
-    for mark, reason in off.items():
-        if mark not in (config.getoption("-m") or ""):
-            skip = pytest.mark.skip(reason=f"{reason}: run it with -m {mark}")
-            for item in items:
-                if mark in item.keywords:
-                    item.add_marker(skip)
+    off = {
+        "bank": "a long bank",
+        "benchmark": "figures against peers",
+        "site": "builds the documentation",
+        "long": "a further case of what others ask",
+    }
+    asked = config.getoption("-m") or ""
+    for item in items:
+        mark = next((one for one in off if one in item.keywords), None)  # a bank's case is that, also of a long law
+        if mark is not None and mark not in asked:
+            item.add_marker(pytest.mark.skip(reason=f"{off[mark]}: run it with -m {mark}"))
 
 
 @pytest.fixture(scope="session")

@@ -32,6 +32,7 @@ CREEPS = {
     )
     for tau_s, share in ((150.0, 0.03), (250.0, 0.1))
 }
+DAILY = (("power_law_creep", 0.35, 0.1), ("second_relaxation", 250.0, 0.1))  # of each law one
 
 
 def _corners(kind: str, rng: np.random.Generator) -> list[tuple[float, float]]:
@@ -75,7 +76,9 @@ def _diagnosed(creep: Array) -> Diagnosis:
     return diagnose(fitted, hold_out=[_recording(3, "shuffled", creep)])
 
 
-@pytest.mark.parametrize("unit", CREEPS, ids=str)
+@pytest.mark.parametrize(
+    "unit", [unit if unit in DAILY else pytest.param(unit, marks=pytest.mark.long) for unit in CREEPS], ids=str
+)
 def test_creep_beyond_the_usual_bounds_is_told_alone(unit: tuple[str, float, float]) -> None:
     """At its bound a law left a permanent set, 0.87 to 0.95 sure, or had no name."""
     found = _diagnosed(CREEPS[unit](np.arange(int(RATE_HZ * DURATION_S)) / RATE_HZ))

@@ -238,7 +238,7 @@ def test_a_wall_that_conditions_as_its_load_turns_does_not_slip() -> None:
         assert not any(one.gain_changes for one in told)
 
 
-@pytest.mark.parametrize("slips", [(0.0, 0.05, 0.0), (0.04, 0.05)])
+@pytest.mark.parametrize("slips", [pytest.param((0.0, 0.05, 0.0), marks=pytest.mark.long), (0.04, 0.05)])
 def test_a_wall_that_conditions_slips_where_its_gain_changes_once_in_a_recording(slips: tuple[float, ...]) -> None:
     """Else it had no name, and its force on another recording was off by as much as the plain model's."""
     conditioned = CURVED.with_part("cycle_conditioning", [0.15, 3.0, 0.0, 1.0])

@@ -166,7 +166,7 @@ def plain() -> tuple[list[Recording], Diagnosis]:
     return runs, diagnose(runs[:2], hold_out=[runs[2]])
 
 
-@pytest.mark.parametrize("values", [(0.08, 0.03, 0.0), (0.13, 0.1, 0.0)])
+@pytest.mark.parametrize("values", [(0.08, 0.03, 0.0), pytest.param((0.13, 0.1, 0.0), marks=pytest.mark.long)])
 def test_a_corner_below_the_least_load_is_a_dead_band_and_no_curve(values: tuple[float, float, float]) -> None:
     """A tare lifts every load over the band, so that a fit that begins small has no slope towards it."""
     model = MODEL.with_part(effect("dead_band"), np.array(values))
@@ -224,7 +224,10 @@ def test_a_lag_that_an_arm_as_walls_have_imitates_is_a_lag() -> None:
     assert cause.parameters["time_constant"].value == pytest.approx(lag_s, rel=0.2)
 
 
-@pytest.mark.parametrize(("cutoff_hz", "damping"), [(2.0, 0.7), (6.0, 0.7), (2.5, 0.4), (5.0, 0.4)])
+@pytest.mark.parametrize(
+    ("cutoff_hz", "damping"),
+    [(2.0, 0.7), *(pytest.param(*one, marks=pytest.mark.long) for one in ((6.0, 0.7), (2.5, 0.4), (5.0, 0.4)))],
+)
 def test_a_lag_of_two_poles_that_are_a_pair_is_a_lag_alone(cutoff_hz: float, damping: float) -> None:
     """Of a Butterworth filter, or a tube with its cavity, two real poles were a delay, or left a gas that heats."""
     turn, step_s = 2.0 * np.pi * cutoff_hz, 0.002
@@ -253,7 +256,7 @@ def test_a_lag_of_two_poles_that_are_a_pair_is_a_lag_alone(cutoff_hz: float, dam
     assert 0.5 / np.sqrt(0.25 + (cause.parameters["second_pole"].value - 0.5) ** 2) == pytest.approx(damping, rel=0.02)
 
 
-@pytest.mark.parametrize("bow", [0.03, -0.03])
+@pytest.mark.parametrize("bow", [0.03, pytest.param(-0.03, marks=pytest.mark.long)])
 def test_a_bow_that_small_imperfections_could_add_up_to_is_half_sure_and_sure_of_better_units(bow: float) -> None:
     """Of 0.24 % of full scale "no effect of the catalogue accounts for it" was all that was said."""
     runs = []

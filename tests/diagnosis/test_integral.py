@@ -96,6 +96,7 @@ def _damper(friction_n: float, viscous: float, spring: float, seed: int) -> Reco
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction_n", [20.0, *(pytest.param(one, marks=pytest.mark.bank) for one in (0.0, 70.0))])
 def test_the_position_of_a_damper_is_told_and_nothing_is_named_for_certain(friction_n: float) -> None:
     told = diagnose([_damper(friction_n, 0.6 if friction_n else 2.0, 2.0, 1)])

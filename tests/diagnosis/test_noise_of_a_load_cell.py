@@ -41,7 +41,7 @@ def _recording(seed: int, growing: float) -> Recording:
     )
 
 
-@pytest.mark.parametrize("seed", [1, 11, 21])
+@pytest.mark.parametrize("seed", [21, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 11))])
 @pytest.mark.parametrize("growing", [0.0, 3e-3])
 def test_noise_is_said_to_grow_with_the_reading_only_where_the_readings_own_does(growing: float, seed: int) -> None:
     """Without a look at the load's noise all three were said to be so."""
@@ -63,7 +63,9 @@ def test_what_noise_of_the_load_brings_is_fitted_apart(asked: int) -> None:
     assert growing_noise(more, load, 1.0 / RATE_HZ, asked, left) is not None
 
 
-@pytest.mark.parametrize(("noise", "is_told"), [(0.02, True), (0.1, True), (0.002, False)])
+@pytest.mark.parametrize(
+    ("noise", "is_told"), [(0.02, True), (0.002, False), pytest.param(0.1, True, marks=pytest.mark.long)]
+)
 def test_a_load_cell_as_noisy_as_to_limit_what_is_seen_is_told(noise: float, is_told: bool) -> None:
     rng = np.random.default_rng(3)
     load = np.interp(np.arange(6000) % 1000, [0, 200, 600, 1000], [0.0, 0.0, 1.0, 0.0])

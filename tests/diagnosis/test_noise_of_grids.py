@@ -27,7 +27,7 @@ def _read(seed: int, name: str) -> Recording:
     return Recording.from_arrays(time_s=time_s, force_n=500.0 * load, pressure_mbar=100.0 * reading, name=name)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
 def test_an_uneven_grid_is_no_jitter_and_no_noise_that_grows(seed: int) -> None:
     found = diagnose([_read(seed, "first"), _read(seed + 50, "second")])
     kinds = {fault.kind for fault in found.data_faults}

@@ -118,6 +118,7 @@ def found() -> Diagnosis:
     )
 
 
+@pytest.mark.long
 def test_a_clock_that_falls_behind_is_told_beside_a_curve_and_friction(found: Diagnosis) -> None:
     timing = [cause for cause in found.causes if cause.effect.family == "timing"]
     assert [cause.confidence > 0.75 for cause in timing] == [True]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -95,6 +95,7 @@ def test_what_a_good_units_imperfections_add_up_to_decides_how_far_clocks_may_di
     assert own_lags(runs, MODEL, replace(STANDARD, tolerable=0.02)) is None
 
 
+@settings(max_examples=20)
 @given(lags, lags, st.integers(0, 99))
 def test_a_recording_that_judges_shows_its_own_clock_to_a_millisecond(
     fitted_s: float, judged_s: float, seed: int

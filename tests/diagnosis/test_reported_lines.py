@@ -146,6 +146,7 @@ def test_a_hum_that_keeps_step_with_the_load_cycles_is_told_and_leaves_nothing_u
     assert found.baseline.rmse > 0.5 * HUM * FULL_MBAR  # which says what the simulation is off by, hum and all
 
 
+@pytest.mark.long
 def test_an_effect_that_has_no_name_is_seen_beside_a_hum_as_without_one() -> None:
     with_hum, without = _told(HUM, teeth=True), _told(0.0, teeth=True)
     assert {fault.kind for fault in with_hum.data_faults} == {"hum"}

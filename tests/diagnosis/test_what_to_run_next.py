@@ -274,6 +274,7 @@ def test_protocols_are_what_they_say() -> None:
     assert _rates(made["long_hold"]) == {0.25, round(1 / 3, 6)}
 
 
+@pytest.mark.long
 def test_a_slow_log_is_asked_for_protocols_of_its_own_pace() -> None:
     """As one that logs every two minutes: a protocol of a minute has no course there.
 

@@ -75,7 +75,7 @@ def assert_same_trial(found: DayResult, wanted: GaitResult) -> None:
 
 
 @given(size=st.integers(200, 80_000))
-@settings(max_examples=8)
+@settings(max_examples=5)
 def test_blocks_of_any_size_say_what_the_whole_says(size: int) -> None:
     assert_same_trial(analyse_stream(in_blocks(various(), size), coverage=0.8), various_whole())
 
@@ -88,7 +88,7 @@ def test_readings_in_mbar_go_through_the_same_filters() -> None:
     assert_same_trial(found, analyse(pressed, filters, coverage=0.8))
 
 
-@pytest.mark.parametrize("name", ["static", "lead", "kalman", "smoother"])
+@pytest.mark.parametrize("name", ["static", "lead", pytest.param("kalman", marks=pytest.mark.long), "smoother"])
 def test_an_estimator_gives_a_stream_the_forces_of_the_whole(name: str) -> None:
     columns = {name.replace("_n", "_mbar"): 0.2 * values for name, values in columns_of(walked(14.0).recording).items()}
     columns["left_heel_mbar"][2000:2003] = np.nan
@@ -289,12 +289,12 @@ print(found.stride_count, held["VmHWM"].split()[0])
 def test_memory_does_not_grow_with_the_recording() -> None:
     # Not getrusage: a child's peak there begins with that of the process that started it.
     strides, peak_kb = {}, {}
-    for minutes in (10, 60):
+    for minutes in (5, 40):
         said = subprocess.run(
             [sys.executable, "-c", MEMORY, str(minutes)], check=True, capture_output=True, text=True
         ).stdout.split()
         strides[minutes], peak_kb[minutes] = int(said[0]), int(said[1])
-    assert strides[60] > 5 * strides[10]
-    # 50 minutes of readings are 38 MB, their strides and events as objects 5 MB; the allocator's own play is less.
-    assert peak_kb[60] - peak_kb[10] < 16_000
-    assert peak_kb[60] < 500_000
+    assert strides[40] > 7 * strides[5]
+    # 35 minutes of readings are 27 MB, their strides and events as objects 4 MB; the allocator's own play is less.
+    assert peak_kb[40] - peak_kb[5] < 12_000
+    assert peak_kb[40] < 500_000

@@ -32,7 +32,7 @@ def _recorded(rates_n_per_s: tuple[float, ...], seed: int, name: str) -> Recordi
     return Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=0.18 * load * stiffer + noise, name=name)
 
 
-@pytest.mark.parametrize("faster", [1.0, 10.0])
+@pytest.mark.parametrize("faster", [pytest.param(1.0, marks=pytest.mark.long), 10.0])
 def test_an_extension_that_is_worse_on_faster_loads_says_so(faster: float) -> None:
     """Judged by loads as fitted, the effect is explained; by ten times faster ones it is not, and the page says why."""
     fitted = [_recorded((20.0, 40.0, 80.0, 160.0), 1, "slow_1"), _recorded((30.0, 60.0, 120.0), 2, "slow_2")]

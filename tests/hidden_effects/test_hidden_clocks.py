@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bank import PLAIN, within_reach
-from daily import first_and_bank
+from daily import first_and_bank, first_and_long
 from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Diagnosis, diagnose
@@ -29,7 +29,10 @@ def _found(effects: dict[str, float], seed: int, lags_s: Sequence[float]) -> Dia
     return diagnose(runs[:count], runs[count:])
 
 
-@pytest.mark.parametrize("effects", [{}, {"orifice_leak": 1.0}, {"wall_hardening": 1.0}, {"play_hysteresis": 1.0}])
+@pytest.mark.parametrize(
+    "effects",
+    first_and_long([{}, {"orifice_leak": 1.0}, {"wall_hardening": 1.0}, {"play_hysteresis": 1.0}], [{}]),
+)
 @pytest.mark.parametrize("seed", first_and_bank(range(4), {1}))
 def test_files_that_are_each_late_by_another_time_have_their_units_causes_and_no_delay(
     effects: dict[str, float], seed: int

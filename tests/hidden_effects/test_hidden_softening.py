@@ -41,7 +41,10 @@ def _softened(recording: Recording, full_scale_n: float, gained: Callable[[Array
 
 @pytest.mark.parametrize(
     ("gained", "name", "shape", "share"),
-    [(by_way, "cycle_conditioning", "by_way", 0.9), (by_peak, "mullins_softening", "at_once", 0.8)],
+    [
+        pytest.param(by_way, "cycle_conditioning", "by_way", 0.9, marks=pytest.mark.long),
+        (by_peak, "mullins_softening", "at_once", 0.8),
+    ],
 )
 @pytest.mark.parametrize("seed", first_and_bank(range(4), {0}))
 def test_a_wall_that_softens_by_a_law_of_its_own_is_told(
@@ -68,6 +71,7 @@ def _under_a_tare(recording: Recording, tare_n: float) -> Recording:
     return recording.with_channel(replace(load, values=load.values + tare_n))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", first_and_bank((1, 2, 3), {1}))
 def test_a_wall_that_softens_gives_its_load_back_as_well_where_the_load_cell_shows_too_little(seed: int) -> None:
     case = within_reach({}, PLAIN[seed % len(PLAIN)], seed, recordings=2)

@@ -62,7 +62,7 @@ def _sure(found: Diagnosis) -> set[str]:
     return {one.effect.family for one in found.causes if one.confidence > 0.5 and one.size > 1.5e-3} - {"zero", "tare"}
 
 
-@pytest.mark.parametrize(("open_s", "shut_s"), [(0.002, 0.06), (0.08, 0.004)])
+@pytest.mark.parametrize(("open_s", "shut_s"), [(0.002, 0.06), pytest.param(0.08, 0.004, marks=pytest.mark.long)])
 @pytest.mark.parametrize("seed", first_and_bank([40, 41, 42], {40}))
 def test_a_port_that_opens_one_way_is_told_and_no_lag_is_named_for_it(seed: int, open_s: float, shut_s: float) -> None:
     case = within_reach({}, PLAIN[seed % len(PLAIN)], seed)
@@ -79,6 +79,7 @@ def test_a_port_that_opens_one_way_is_told_and_no_lag_is_named_for_it(seed: int,
     assert np.sign(direction) == np.sign(open_s - shut_s)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tau_s", first_and_bank([0.02, 0.06], {0.02}))
 @pytest.mark.parametrize("seed", first_and_bank([43, 44], {43}))
 def test_a_port_that_is_as_slow_both_ways_is_a_lag(seed: int, tau_s: float) -> None:
@@ -106,6 +107,7 @@ def test_a_gain_that_comes_back_at_rest_is_told_and_no_softening_is_named_for_it
     assert found.gain.gain_percent > 5.0  # half of what is left is noise
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("protocol", first_and_bank([*PLAIN], {"rates_and_holds"}))
 @pytest.mark.parametrize("seed", first_and_bank([62, 63], {62}))
 def test_a_gain_that_stays_gone_at_rest_is_a_softening(seed: int, protocol: str) -> None:
@@ -137,14 +139,20 @@ def test_zeros_that_jump_are_told_with_their_moments_and_nothing_is_sure_beside_
 
 
 @pytest.mark.parametrize(
-    "effects",
-    first_and_bank(
-        [{}, {"wall_hardening": 1.0}, {"zero_drift": 1.0}, {"linear_leak": 1.0}],
-        [{}, {"zero_drift": 1.0}],  # nothing, and what is most like a jump
-    ),
+    ("effects", "jumps"),
+    [
+        ({}, JUMPS[0]),
+        ({"zero_drift": 1.0}, ()),  # what is most like a jump
+        pytest.param({}, (), marks=pytest.mark.long),
+        pytest.param({"zero_drift": 1.0}, JUMPS[0], marks=pytest.mark.long),
+        *(
+            pytest.param(effects, jumps, marks=pytest.mark.bank)
+            for effects in ({"wall_hardening": 1.0}, {"linear_leak": 1.0})
+            for jumps in ((), JUMPS[0])
+        ),
+    ],
 )
 @pytest.mark.parametrize("seed", first_and_bank([54, 55], {54}))
-@pytest.mark.parametrize("jumps", [(), JUMPS[0]])
 def test_jumps_of_a_single_recording_are_told_but_for_the_cycle_that_is_held_out(
     seed: int, effects: dict[str, float], jumps: tuple[tuple[float, float], ...]
 ) -> None:

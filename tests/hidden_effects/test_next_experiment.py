@@ -30,7 +30,7 @@ def of_family(diagnosis: Diagnosis, family: str) -> Cause:
 @pytest.mark.parametrize(
     ("name", "percent", "protocol", "seed"),
     [
-        ("delay", 0.4, "rates", 1_000_001),
+        pytest.param("delay", 0.4, "rates", 1_000_001, marks=pytest.mark.long),
         ("sensor_lag", 0.3, "rates", 1_000_002),
     ],
 )

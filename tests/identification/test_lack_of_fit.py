@@ -23,7 +23,7 @@ def loads(repeats: int = 3) -> Recording:
     return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=load_n)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("correlation", [0.5, *(pytest.param(one, marks=pytest.mark.long) for one in (0.0, 0.9))])
 def test_false_alarms_are_as_many_as_stated(correlation: float) -> None:
     recording = loads()
     rng = np.random.default_rng(11)

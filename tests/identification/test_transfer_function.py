@@ -87,7 +87,7 @@ def excitation(denominator, hold, count, rng):
     return np.repeat(rng.choice([-1.0, 1.0], count), rng.integers(1, longest, count))[:count], step_s
 
 
-@settings(max_examples=14)
+@settings(max_examples=9)
 @given(stable_systems(), st.sampled_from(["zoh", "foh"]), st.integers(0, 2**32 - 1))
 def test_any_order_is_recovered_exactly_without_noise_and_within_its_error_bars_with_it(system, hold, seed):
     rng = np.random.default_rng(seed)
@@ -153,7 +153,7 @@ def test_uneven_recursion_is_the_even_one_on_even_steps(system, hold, delay):
     np.testing.assert_allclose(uneven.value, even.value, atol=1e-9)
 
 
-@pytest.mark.parametrize("prefilter_rad_s", [5.0, 20.0])
+@pytest.mark.parametrize("prefilter_rad_s", [pytest.param(5.0, marks=pytest.mark.long), 20.0])
 def test_rao_garnier_settles_in_ten_iterations_at_the_cramer_rao_bound(prefilter_rad_s):
     u, step_s = prbs(10, 7), 0.01
     y = simulated(RAO_GARNIER, u, step_s)
@@ -199,19 +199,29 @@ def test_the_three_methods_share_srivcs_optimum_on_rao_garnier():
 
 
 @pytest.mark.parametrize(
-    ("method", "seed"),
+    ("method", "seed", "max_delay_s"),
     [
-        *((method, 2) for method in ("srivc", *PEM)),
-        *(pytest.param("srivc", seed, marks=pytest.mark.bank) for seed in (1, 3)),
+        ("srivc", 2, None),
+        *((method, 2, 10.0) for method in PEM),
+        *(pytest.param(method, 2, None, marks=pytest.mark.long) for method in PEM),
+        *(pytest.param("srivc", seed, None, marks=pytest.mark.bank) for seed in (1, 3)),
     ],
 )
-def test_a_delay_of_eight_seconds_is_found(method, seed):
+def test_a_delay_of_eight_seconds_is_found(method, seed, max_delay_s):
     step_s, late = 0.1, 80
     u = prbs(10, 5, 3000)
     y = np.concatenate([np.zeros(late), simulated(LATE, u, step_s)[:-late]])
     noisy = with_noise(y, 15.0, np.random.default_rng(seed))
     estimate = identify_transfer_function(
-        u, noisy, sample_time_s=step_s, poles=2, zeros=1, delay_s="estimate", method=method, prefilter_rad_s=2.0
+        u,
+        noisy,
+        sample_time_s=step_s,
+        poles=2,
+        zeros=1,
+        delay_s="estimate",
+        max_delay_s=max_delay_s,
+        method=method,
+        prefilter_rad_s=2.0,
     )
     assert estimate.iterations <= 10
     assert abs(estimate.delay_s - 8.0) < 4.0 * estimate.delay_sd_s < 0.02

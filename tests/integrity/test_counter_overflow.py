@@ -59,6 +59,7 @@ def test_what_is_no_whole_number_comes_from_no_counter(scale: float) -> None:
     assert unwrapped(recording, STANDARD) == (recording, [])
 
 
+@pytest.mark.long
 def test_a_unit_whose_counter_ran_over_is_diagnosed_as_it_is() -> None:
     """As large as it is, whatever the word: the fault is told, and no cause is found for it."""
     counts = _counts(3, 5e4)

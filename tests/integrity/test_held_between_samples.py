@@ -39,6 +39,7 @@ def _recording(load_n: Array, reading_mbar: Array, name: str = "run") -> Recordi
     return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading_mbar, name=name)
 
 
+@settings(max_examples=25)
 @given(st.integers(2, 12), st.sampled_from(["load", "reading"]), st.integers(0, 2**16))
 def test_a_channel_that_is_held_is_used_where_it_was_read(count: int, which: str, seed: int) -> None:
     load_n = _load_n()
@@ -107,7 +108,7 @@ UNITS = pytest.mark.parametrize(("lag", "delay"), [(0.1, 0), (3.0, 2), (12.0, 1)
 
 @COUNTS
 @UNITS
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 2**16))
 def test_a_load_that_was_set_step_by_step_is_known_between_its_steps(
     count: int, lag: float, delay: int, seed: int
@@ -119,7 +120,7 @@ def test_a_load_that_was_set_step_by_step_is_known_between_its_steps(
 
 @COUNTS
 @UNITS
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 2**16))
 def test_a_load_that_went_on_while_its_value_stood_is_used_where_it_was_read(
     count: int, lag: float, delay: int, seed: int

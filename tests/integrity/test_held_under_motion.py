@@ -54,7 +54,7 @@ STARTS = np.array([700, 1501, 2333, 3000, 4242])
 
 @pytest.mark.parametrize("grid", [0.0, 1e-5])
 @pytest.mark.parametrize(("smooth", "length"), [(6.0, 5), (6.0, 8), (6.0, 12), (10.0, 5), (20.0, 8)])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
 def test_what_repeats_beside_noise_is_held_however_fast_the_signal_moves(
     seed: int, smooth: float, length: int, grid: float
 ) -> None:

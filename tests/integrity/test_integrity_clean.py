@@ -94,14 +94,14 @@ PHYSICS = {
 }
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     bladder=BLADDERS,
     protocol=st.sampled_from(PROTOCOLS),
     noise_percent=st.sampled_from([0.0, 0.005, 0.05, 0.3]),
     load_noise_n=st.sampled_from([0.0, 0.3, 2.23]),
     bits=st.sampled_from([12, 16, 24]),
-    rate_hz=st.sampled_from([50.0, 100.0, 200.0, 1000.0]),
+    rate_hz=st.sampled_from([50.0, 100.0, 200.0, 500.0]),
     corner_s=st.sampled_from([0.0, 0.04]),
     lag_s=st.sampled_from([0.0, 0.001, 0.1]),
     seed=st.integers(0, 999),
@@ -125,7 +125,7 @@ def test_a_simulated_unit_has_no_faults(
     assert found.clock_offset_s == (0.0,)
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     shape=st.sampled_from(sorted(SHAPES)),
     physics=st.sampled_from(sorted(PHYSICS)),
@@ -133,7 +133,7 @@ def test_a_simulated_unit_has_no_faults(
     noise=st.sampled_from([0.0, 1e-5, 0.0005, 0.003]),
     load_noise_n=st.sampled_from([0.0, 0.3]),
     bits=st.sampled_from([0, 12, 16]),
-    rate_hz=st.sampled_from([50.0, 100.0, 500.0]),
+    rate_hz=st.sampled_from([50.0, 100.0, 200.0]),
     seed=st.integers(0, 999),
 )
 def test_an_ideal_unit_of_other_equations_has_no_faults(shape, physics, size, noise, load_noise_n, bits, rate_hz, seed):

@@ -83,7 +83,7 @@ def test_a_drift_that_is_too_small_to_be_seen_in_a_short_recording_is_one_all_th
     assert values[0] == pytest.approx(0.003, rel=0.2)
 
 
-@pytest.mark.parametrize("parted_s", [0.0, 0.1])
+@pytest.mark.parametrize("parted_s", [0.0, pytest.param(0.1, marks=pytest.mark.long)])
 def test_a_drift_that_began_before_the_recordings_is_told_though_nothing_else_is_there(parted_s: float) -> None:
     """Without the lag that they begin with, the fit takes a relaxation for it and comes to 2 % of full scale."""
     runs = [staircase(levels, 3.0, 0.1, 0.004, levels, parted_s) for levels in (6, 8, 11)]

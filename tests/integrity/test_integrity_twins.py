@@ -117,8 +117,15 @@ def test_fewer_samples_than_tell_anything_are_not_looked_at() -> None:
     assert list(_told(_run("one"), _part(_run("one"), 0, few, "enough"))) == [1]
 
 
-@pytest.mark.parametrize("noise", [0.05, 0.3, 1.0])
-@pytest.mark.parametrize(("load_step_n", "step"), [(3.2, 0.4), (32.0, 4.0), (0.0, 4.0)])
+@pytest.mark.parametrize(
+    ("load_step_n", "step", "noise"),
+    [
+        *((3.2, 0.4, noise) for noise in (0.3, 1.0)),
+        *((32.0, 4.0, noise) for noise in (0.3, 1.0)),
+        *((0.0, 4.0, noise) for noise in (0.05, 0.3, 1.0)),
+        *(pytest.param(*steps, 0.05, marks=pytest.mark.long) for steps in ((3.2, 0.4), (32.0, 4.0))),
+    ],
+)
 def test_coarse_readings_are_not_alike_by_chance_and_copies_of_them_are_told(
     load_step_n: float, step: float, noise: float
 ) -> None:
@@ -162,6 +169,7 @@ def _measured(seed: int, name: str) -> Recording:
     return Recording.from_arrays(time_s=0.01 * np.arange(load.size), force_n=load, pressure_mbar=reading, name=name)
 
 
+@pytest.mark.long
 def test_a_diagnosis_does_not_judge_on_what_it_was_fitted_to() -> None:
     """Left out where nothing else is there, else judged on the rest."""
     one, other = _measured(1, "one"), _measured(2, "other")

@@ -166,7 +166,9 @@ def test_nor_does_one_of_steps_alone_that_is_read_late_by_half_of_one(late_s: fl
     assert found.clock_offset_s[0] == pytest.approx(late_s, abs=0.02)
 
 
-@pytest.mark.parametrize("late_s", [-2.5, -2.0, 1.6, 2.0, 2.5, 3.0])
+@pytest.mark.parametrize(
+    "late_s", [-2.5, 1.6, 3.0, *(pytest.param(late_s, marks=pytest.mark.long) for late_s in (-2.0, 2.0, 2.5))]
+)
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.bank)])
 def test_steps_are_read_as_late_as_they_are_alone_and_beside_others(late_s: float, seed: int) -> None:
     """Late by more than a step: no two steps are alike, so that the reading follows its own far more closely."""
@@ -219,7 +221,15 @@ def test_a_period_that_is_as_long_as_the_longest_lag_is_one_of_the_peaks() -> No
     assert _peak(even, STANDARD) == 100
 
 
-@pytest.mark.parametrize(("presses", "power", "rate_hz"), [(6, 0.5, 5.0), (6, 1.0, 20.0), (7, 2.0, 20.0)])
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("presses", "power", "rate_hz"),
+    [
+        (6, 0.5, 5.0),
+        (6, 1.0, 20.0),
+        (7, 2.0, 20.0),
+    ],
+)
 def test_a_reading_that_falls_over_a_few_even_presses_has_a_baseline_that_follows_it(
     presses: int, power: float, rate_hz: float
 ) -> None:
@@ -339,6 +349,11 @@ def test_a_walk_shares_the_delay_that_ramps_show() -> None:
     assert integrity.clock_offset_s[0] == pytest.approx(0.25, abs=0.06)
     ((one, value),) = aligned(runs, integrity).parts
     assert (one.name, float(value[0])) == ("delay", pytest.approx(0.25, abs=0.06))
+
+
+@pytest.mark.long
+def test_and_it_is_found_to_milliseconds_for_both() -> None:
+    runs = [_ramps(0.25), _walked(0.25, slow_share=0.0)]
     found = diagnose(runs, hold_out=[_ramps(0.25, seed=3)])
     (cause,) = [cause for cause in found.causes if cause.name == "delay"]
     assert cause.parameters["delay"].value == pytest.approx(0.25, abs=0.005)
@@ -393,7 +408,9 @@ def _parted(recording: Recording, late_s: float) -> Recording:
     )
 
 
-@pytest.mark.parametrize("late_s", [-2.0, -0.5, -0.3, 0.3, 0.5, 1.2, 2.0])
+@pytest.mark.parametrize(
+    "late_s", [-2.0, 0.5, *(pytest.param(late_s, marks=pytest.mark.long) for late_s in (-0.5, -0.3, 0.3, 1.2, 2.0))]
+)
 @pytest.mark.parametrize("made", [lambda: _walked(0.0, held=False), lambda: _ramps(0.0)], ids=["steps", "ramps"])
 def test_a_recording_alone_that_is_late_or_early_is_that_and_nothing_else(
     made: Callable[[], Recording], late_s: float

@@ -156,7 +156,7 @@ def _sound(protocol: str) -> HiddenCase:
 
 
 @pytest.mark.parametrize("protocol", ["rates", "walking", "holds", "staircase", "shuffled", "step", "minor_loops"])
-@pytest.mark.parametrize("by_s", [0.0, 0.1, -0.1])
+@pytest.mark.parametrize("by_s", [0.0, 0.1, pytest.param(-0.1, marks=pytest.mark.long)])
 def test_sound_units_are_told_two_clocks_where_there_are_two(protocol: str, by_s: float) -> None:
     case = _sound(protocol)
     found = examine([case.recordings[0], _late(case.recordings[1], by_s), *case.hold_out], STANDARD)
@@ -165,7 +165,7 @@ def test_sound_units_are_told_two_clocks_where_there_are_two(protocol: str, by_s
     assert told == ([("two_clocks", 1)] if by_s else [])
 
 
-@pytest.mark.parametrize("protocol", ["walking", "staircase"])
+@pytest.mark.parametrize("protocol", [pytest.param("walking", marks=pytest.mark.long), "staircase"])
 def test_a_sound_unit_of_which_one_recording_is_late_is_as_good_as_another(protocol: str) -> None:
     case = _sound(protocol)
     found = diagnose([_late(case.recordings[0], 0.1), case.recordings[1]], case.hold_out)
@@ -203,13 +203,21 @@ def test_where_all_tell_lags_the_shortest_is_taken_as_told_and_the_others_lie_be
 
 
 # -- what is held out -------------------------------------------------------------------------------------------------
+@cache
+def _three(late_s: float) -> tuple[list[Recording], Integrity]:
+    """Three that are late by as much, and what is found of them alone."""
+    fitted = [_run(late_s, seed) for seed in range(3)]
+    return fitted, examine(fitted, STANDARD)
+
+
 @pytest.mark.parametrize("late_s", [0.0, 0.5])
-@pytest.mark.parametrize("beside_s", [-0.5, 0.0, 0.1, 0.15, 0.5, 2.0])
+@pytest.mark.parametrize(
+    "beside_s", [-0.5, 0.0, 0.1, 0.15, *(pytest.param(beside_s, marks=pytest.mark.long) for beside_s in (0.5, 2.0))]
+)
 def test_what_is_held_out_decides_nothing_of_the_clocks_of_those_that_are_fitted(
     late_s: float, beside_s: float
 ) -> None:
-    fitted = [_run(late_s, seed) for seed in range(3)]
-    alone = examine(fitted, STANDARD)
+    fitted, alone = _three(late_s)
     found = examine([*fitted, _run(late_s + beside_s, 7)], STANDARD, 3)
     assert (found.one_clock, found.clock_offset_s[:3]) == (alone.one_clock, alone.clock_offset_s)
     is_other = abs(beside_s) > 0.1 or (
@@ -402,19 +410,28 @@ def test_a_day_without_samples_in_a_recording_is_no_matter() -> None:
 
 
 # -- large numbers ----------------------------------------------------------------------------------------------------
+def _one_late() -> list[Recording]:
+    return [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
+
+
+@cache
+def _usual_lags_s(last: int | None) -> tuple[float, ...]:
+    """Of those up to the ``last`` sample of each, in the usual units."""
+    return examine([one.taken(slice(0, last)) for one in _one_late()], STANDARD).clock_offset_s
+
+
 @pytest.mark.parametrize("size", [1e-60, 1e60])
 @pytest.mark.parametrize("of_load", [False, True])
 @pytest.mark.filterwarnings("error")
 def test_numbers_of_any_size_tell_the_same(size: float, of_load: bool) -> None:
-    plain = [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
     large = []
-    for one in plain:
+    for one in _one_late():
         channel = one.load if of_load else one.sensor
         large.append(one.with_channel(channel.with_values(size * channel.values)))
-    for part in (slice(0, None), slice(0, 300)):
-        found, usual = (examine([one.taken(part) for one in runs], STANDARD) for runs in (large, plain))
+    for last in (None, 300):
+        found = examine([one.taken(slice(0, last)) for one in large], STANDARD)
         assert found.refusals == ()
-        assert found.clock_offset_s == pytest.approx(usual.clock_offset_s, abs=1e-6)
+        assert found.clock_offset_s == pytest.approx(_usual_lags_s(last), abs=1e-6)
 
 
 @pytest.mark.filterwarnings("error")

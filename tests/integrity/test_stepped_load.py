@@ -129,7 +129,11 @@ def test_what_is_missing_stays_missing() -> None:
 # -- diagnoses --------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("protocol", "seed"),
-    [("rates", 1), pytest.param("rates", 2, marks=pytest.mark.bank), ("staircase", 1), ("holds", 0), ("step", 1)],
+    [
+        ("staircase", 1),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in (("rates", 1), ("holds", 0), ("step", 1))),
+        pytest.param("rates", 2, marks=pytest.mark.bank),
+    ],
 )
 def test_a_sound_unit_is_as_good_as_such_a_load_can_tell(protocol: str, seed: int) -> None:
     """Each was unexplained, but for what two of them were told."""
@@ -142,8 +146,8 @@ def test_a_sound_unit_is_as_good_as_such_a_load_can_tell(protocol: str, seed: in
     ("effect", "percent", "protocol", "seed"),
     [
         ("zero_drift", 0.6, "rates_and_holds", 5),
-        ("second_relaxation", 0.6, "mixed", 6),
-        ("linear_leak", 1.0, "mixed", 6),
+        pytest.param("second_relaxation", 0.6, "mixed", 6, marks=pytest.mark.long),
+        pytest.param("linear_leak", 1.0, "mixed", 6, marks=pytest.mark.long),
     ],
 )
 def test_an_effect_is_named_as_under_a_fine_load(effect: str, percent: float, protocol: str, seed: int) -> None:

@@ -72,7 +72,7 @@ def test_wild_values_are_missing_and_told_with_channel_count_and_the_farthest(
     assert (found.refusals, found.clock_offset_s) == ((), (0.0,))
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(
     st.sampled_from(["force", "pressure"]),
     st.dictionaries(st.integers(0, TIME_S.size - 1), st.floats(2e4, 1e9), min_size=1, max_size=20),
@@ -150,7 +150,7 @@ def test_what_load_and_reading_do_together_was_a_press_unless_both_are_one_numbe
         assert (len(findings), bool(kept.load.present[7])) == ((2, False) if is_wild else (0, True))
 
 
-@pytest.mark.parametrize("half_s", [1.0, 1.5])
+@pytest.mark.parametrize("half_s", [1.0, pytest.param(1.5, marks=pytest.mark.long)])
 def test_a_few_presses_of_a_unit_that_rests_most_of_the_time_are_no_wild_values(half_s: float) -> None:
     """Less than a fortieth of the samples are loaded, so that what nearly all others are is noise."""
     rng, time_s = np.random.default_rng(0), np.arange(0.0, 400.0, 0.01)

@@ -63,5 +63,6 @@ def test_each_equivalent_mutant_is_one_of_the_source() -> None:
     """A line that is edited makes another mutant: then its entry goes, or is argued for anew."""
     entries = re.findall(r"([\w/]+\.py): (`[^`]*` → `[^`]*`)", (HERE / "equivalent.md").read_text(encoding="utf-8"))
     package = HERE.parent.parent / "smartshoe"
-    known = {file: {str(one) for one in changes((package / file).read_text("utf-8"))} for file, _ in entries}
+    files = {file for file, _ in entries}
+    known = {file: {str(one) for one in changes((package / file).read_text("utf-8"))} for file in files}
     assert [f"{file}: {shown}" for file, shown in entries if shown not in known[file]] == []

@@ -28,6 +28,11 @@ def test_nothing_is_clipped_small_faint_broken_or_fetched(browser: Browser, made
 
 
 @pytest.mark.browser
+@pytest.mark.parametrize(
+    "made",
+    [page if page in ("session", "drift") else pytest.param(page, marks=pytest.mark.long) for page in PAGES],
+    indirect=True,
+)
 def test_a_browser_that_only_takes_a_picture_shows_the_charts(browser: Browser, made: Path) -> None:
     """It shows no frame, so that nothing ever comes into sight."""
     assert "<canvas" in dumped(made, 1200, 6000)

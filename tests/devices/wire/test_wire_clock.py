@@ -113,7 +113,7 @@ def test_a_minute_is_timed_within_a_millisecond(law: str) -> None:
     assert fit.samples > 0.95 * run.true_s.size
 
 
-@pytest.mark.parametrize("law", [LAWS[0], LAWS[3]])
+@pytest.mark.parametrize("law", [pytest.param(LAWS[0], marks=pytest.mark.long), LAWS[3]])
 def test_the_standard_error_of_the_skew_is_the_size_of_its_errors(law: str) -> None:
     true_s = np.arange(60 * RATE_HZ) / RATE_HZ
     errors = []

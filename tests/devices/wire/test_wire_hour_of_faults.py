@@ -106,7 +106,7 @@ def test_minutes_of_many_faults(seed: int) -> None:
     assert _check(Shoe(seed, 120.0), FAULTS.model_copy(update=harsh))["disconnects"] == 6
 
 
-@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.long)])
 def test_an_hour_of_each_shoe(seed: int) -> None:
     # In larger pieces than the minutes above, whose claim the small ones are: a fifth of the calls.
     outcome = _check(Shoe(seed, 3600.0, slot_s=0.5, largest_read=7500))

@@ -115,5 +115,5 @@ class SerialMachine(RuleBasedStateMachine):
 TestSerialMachine = pytest.mark.wire(SerialMachine.TestCase)
 # Not shrunk: where a step hangs, each attempt would take its whole bound.
 TestSerialMachine.settings = settings(
-    max_examples=60, stateful_step_count=40, deadline=None, phases=[Phase.explicit, Phase.generate]
+    max_examples=30, stateful_step_count=40, deadline=None, phases=[Phase.explicit, Phase.generate]
 )

@@ -58,7 +58,7 @@ def test_it_never_goes_beyond_what_warm_air_does(offset_n: float) -> None:
         assert zero.zero == pytest.approx(offset_n, abs=1.0)
 
 
-@pytest.mark.parametrize("activity", ["stand", "tiptoe"])
+@pytest.mark.parametrize("activity", ["stand", pytest.param("tiptoe", marks=pytest.mark.long)])
 def test_a_person_who_stands_for_an_hour_keeps_the_load(activity: str) -> None:
     forces = foot_n(made(activity, 3600.0), "right")
     zero = SwingZero(4, sample_rate_hz=RATE_HZ)
