@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import marginal
-from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.diagnosis._session import Session, fitted_of, stretch_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
@@ -20,8 +21,7 @@ USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # about the mean o
 _, SHARE, RATE = BASELINE
 MOST_OF_WALL = 5.0  # share; beyond it the static gain is six times the instant one, and the wall a dashpot
 FASTEST_PER_S = RATE.upper / (1.0 + SHARE.upper)  # pole; a wall's arm is slower, a sensor's lag seldom faster
-# A resolution of the start. All halved or doubled, no name changed in two cases.
-POLES_PER_S = np.geomspace(RATE.lower, FASTEST_PER_S, 35)
+POLES_A_DECADE = 9.2  # a resolution of the start; halved or doubled, no name changed in two cases
 WALL_RATIOS = 1.02, 50.0  # bounds for any tube
 
 
@@ -29,7 +29,10 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     """The best standard linear solid of positive gain, with the wall's ratio of `_wall_ratio`."""
     _, gain, share, pole = _best_by_sign(sessions).get(1.0, (0.0, 1.0, 0.0, 0.2))
     ratio = _wall_ratio(sessions, gain, scale)
-    return ExtendedModel(gain, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), ratio)
+    rate, slowest = pole * (1.0 + share), RATE.lower / stretch_of(sessions)
+    return ExtendedModel(
+        gain, share, rate, scale.load_n, scale.reading, scale.unit.symbol, (), ratio, slowest_per_s=slowest
+    )
 
 
 def has_negative_gain(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
@@ -42,6 +45,13 @@ def has_negative_gain(sessions: Sequence[Session], thresholds: Thresholds) -> bo
     return thresholds.clear * errors.get(-1.0, math.inf) < errors.get(1.0, math.inf)
 
 
+def poles_per_s(stretch: float) -> Array:
+    """The poles (k,) from which a fit may start, 1/s, for recordings ``stretch`` times longer than usual."""
+    slowest = RATE.lower / stretch
+    count = 1 + round(POLES_A_DECADE * math.log10(FASTEST_PER_S / slowest))
+    return np.geomspace(slowest, FASTEST_PER_S, count)
+
+
 def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float, float, float]]:
     """Squared error, gain, share and pole (1/s) of the best solid for each sign of the gain.
 
@@ -50,7 +60,8 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
     """
     fitted = fitted_of(sessions)
     best: dict[float, tuple[float, float, float, float]] = {}
-    for pole in POLES_PER_S:
+    poles = poles_per_s(stretch_of(sessions))
+    for pole in poles:
         gram = np.zeros((3, 3))
         for session in fitted:
             load = session.conditions.load
@@ -61,7 +72,7 @@ def _best_by_sign(sessions: Sequence[Session]) -> dict[float, tuple[float, float
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
         share = float(slow / fast) if fast != 0.0 else SHARE.upper
         # Within the bounds of share and rate, since a fit starts there: beyond them it would be another solid.
-        lowest = max(SHARE.lower, RATE.lower / pole - 1.0)
+        lowest = max(SHARE.lower, float(poles[0]) / pole - 1.0)
         shares = (share,) if lowest <= share <= SHARE.upper else (lowest, SHARE.upper)
         for share in shares:
             shape = np.array([1.0, share]) / (1.0 + share)
@@ -86,7 +97,7 @@ def has_arm_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
 def has_extreme_arm(model: ExtendedModel) -> bool:
     """Whether no wall has such an arm: it follows an effect, or another kind of sensor."""
     share, rate = model.relaxing_share, model.relaxation_rate_per_s
-    return not (SHARE.lower < share < MOST_OF_WALL and RATE.lower < rate < FASTEST_PER_S)
+    return not (SHARE.lower < share < MOST_OF_WALL and model.slowest_per_s < rate < FASTEST_PER_S)
 
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:

@@ -72,7 +72,7 @@ def diagnose(
     kept_out, limits_of_kept_out = _spread(kept_out, "to judge on")
     not_taken = limits_of_fitted + limits_of_kept_out
     everything, count = [*fitted, *kept_out], len(fitted)
-    decided = decided_by(thresholds, material)
+    decided = decided_by(thresholds, material).lasting(max(one.duration_s for one in fitted))
     integrity = examine(everything, decided, count)
     everything = [*integrity.recordings]
     shared = twins(everything, decided)

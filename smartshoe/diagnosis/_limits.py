@@ -195,13 +195,13 @@ def limit_relaxation_range(
     model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, *, beside_names: bool
 ) -> list[str]:
     """The sentence on a unit that relaxes more slowly, or faster, than the baseline can follow."""
-    slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
+    slow, fast = model.relaxation_rate_per_s <= model.slowest_per_s, model.relaxation_rate_per_s >= RATE.upper
     if (
         not (slow or fast)
         or rms_difference(sessions, model, replace(model, relaxing_share=0.0)) <= thresholds.tolerable
     ):
         return []
-    end_s = 1.0 / (RATE.lower if slow else RATE.upper)
+    end_s = 1.0 / (model.slowest_per_s if slow else RATE.upper)
     return [
         f"the baseline's relaxation is at the end of its range, {end_s:.3g} s:"
         f" a unit that relaxes {'more slowly' if slow else 'faster'} cannot be followed"
@@ -376,7 +376,10 @@ def limit_own_gains(gains: Sequence[OwnGain]) -> list[str]:
     """The sentence on recordings with gains of their own."""
     if not gains:
         return []
-    told = "all else is judged with this allowed for; no model can predict the gain of another recording"
+    told = (
+        "causes are judged with this allowed for, what is left over is not; no model can predict the gain of another"
+        " recording"
+    )
     if changes := changes_of(gains):
         return [f"the gain changes {_when(changes)}, for example because the unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))

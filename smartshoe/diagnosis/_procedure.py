@@ -233,13 +233,13 @@ def _structures_of(
     # A line may be told of what is left for what is held out, which decides no name.
     partly_held = {one.index for one in sessions if one.fitted.any() and one.judged.any()}
     of_names = [*of_faults, *(one for one in of_residuals if one.recording not in partly_held)]
-    thinned = after.thinned
+    thinned, quick = after.thinned, after.fine
     if len(of_names) < len(told):
-        thinned, _ = _without_tones(given, *_residuals(found.fit.model, given), of_names)
+        thinned, quick = _without_tones(given, *_residuals(found.fit.model, given), of_names)
     return _Structures(
         before.structure,
         after.structure,
-        _structure_where_fitted(sessions, thinned, given.thresholds),
+        _structure_where_fitted(given, thinned, quick),
         fault_rms(faults, sessions, given.scale),
         before.fine,
         after.fine,
@@ -268,7 +268,8 @@ def _left_by(model: ExtendedModel, given: Prepared, told: Sequence[DataFault]) -
     noise = fitted_rms(given.fine, fine)
     thinned, fine = _without_tones(given, thinned, fine, told)
     quick = repeating_structure(given.fine, fine, given.thresholds)
-    return _Left(residual_structure(given.sessions, thinned, given.thresholds, quick), thinned, fine, noise)
+    left = residual_structure(given.sessions, thinned, given.thresholds, quick, fine=(given.fine, fine))
+    return _Left(left, thinned, fine, noise)
 
 
 def _residuals(model: ExtendedModel, given: Prepared) -> tuple[list[Array], list[Array]]:
@@ -408,13 +409,20 @@ def _limits_of_the_names(
     )
 
 
-def _structure_where_fitted(
-    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
-) -> ResidualStructure:
+def _structure_where_fitted(given: Prepared, thinned: Sequence[Array], fine: Sequence[Array]) -> ResidualStructure:
     """The structure left in fitted samples: held-out data decides no name, and may hold other loads."""
-    learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
-    learnt = [(one, left) for one, left in learnt if one.usable.any()]
-    return residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
+    at_full_rate = _where_fitted(given.fine, fine)
+    return residual_structure(*_where_fitted(given.sessions, thinned), given.thresholds, fine=at_full_rate)
+
+
+def _where_fitted(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[list[Session], list[Array]]:
+    """The sessions of which only fitted samples are usable, and their residuals; without those of which none is."""
+    learnt = [
+        (replace(one, usable=one.fitted), left)
+        for one, left in zip(sessions, residuals, strict=True)
+        if one.fitted.any()
+    ]
+    return [one for one, _ in learnt], [left for _, left in learnt]
 
 
 def _strongest_single_effects(found: Inference) -> tuple[Rival, ...]:

@@ -90,14 +90,19 @@ class ResidualStructure:
 
 
 def residual_structure(
-    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds, quick: LackOfFit | None = None
+    sessions: Sequence[Session],
+    residuals: Sequence[Array],
+    thresholds: Thresholds,
+    quick: LackOfFit | None = None,
+    fine: tuple[Sequence[Session], Sequence[Array]] | None = None,
 ) -> ResidualStructure:
     """The tests of the ``residuals``, (n,) for each session, and the place of the largest part.
 
     ``quick`` is the test of repetition at the full rate: thinning averages out what swings faster than the fastest
-    ramp.
+    ramp. ``fine`` are sessions and residuals at that rate, by which correlation is judged, since the average before
+    thinning correlates neighbouring noise; these ones where it is not given.
     """
-    memory = gauss_markov_of(sessions, residuals, thresholds)
+    memory = gauss_markov_of(*(fine or (sessions, residuals)), thresholds)
     says = worst_place(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         stay_s = 2.0 * memory.tau_s

@@ -20,7 +20,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._load_cycles import have_later_cycles
 from smartshoe.diagnosis._noise import FLOOR, effective_noise_sd
-from smartshoe.diagnosis._session import Session, fitted_of
+from smartshoe.diagnosis._session import Session, fitted_of, stretch_of
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family, origin_of
@@ -102,6 +102,8 @@ def available_effects(sessions: Sequence[Session], thresholds: Thresholds) -> li
         found = [e for e in found if not e.is_catch_all]
     if not any(one.recording.sensor.unit.quantity == "pressure" for one in sessions):
         found = [e.of_any_sensor() for e in found]
+    stretch = stretch_of(sessions)
+    found = [e.lasting(stretch) for e in found]
     return [e for e in found if e.needs <= has and not e.is_refinement and (has_cycles or not e.needs_cycles)]
 
 

@@ -19,6 +19,9 @@ def threshold(
     return field(default=value, metadata={**documented, "least": least, "most": most})
 
 
+PROTOCOL_S = 300.0  # the length of recordings for which all ranges of times were chosen
+
+
 @dataclass(frozen=True, slots=True)
 class Thresholds:
     """The numbers that a diagnosis decides by. Carried in the result and printed in the page; `described` lists them.
@@ -190,6 +193,12 @@ class Thresholds:
     bins: int = threshold(4000, "bins", "bins to which long recordings are thinned to look for lags", "speed", least=10)
     hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
     idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
+
+    def lasting(self, longest_s: float) -> Thresholds:
+        """The numbers for recordings of up to ``longest_s``: ``memory_s`` goes on for each decade beyond the usual."""
+        decades = int(math.log10(max(longest_s / PROTOCOL_S, 1.0)))
+        longer = tuple(self.memory_s[-1] * 10.0**k for k in range(1, decades + 1))
+        return replace(self, memory_s=(*self.memory_s, *longer)) if longer else self
 
     def __post_init__(self) -> None:
         """Refuse numbers by which nothing can be decided."""

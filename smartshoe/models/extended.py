@@ -75,7 +75,7 @@ class ExtendedModel:
     ``relaxing_share`` kappa and ``relaxation_rate_per_s`` a give p/f = (s + a)/((1 + kappa) s + a). ``wall_ratio`` is N
     of `smartshoe.models.core` and matters for leaks and heat only. ``noise`` is the rms of the noise in the readings,
     as a share of ``full_scale_reading``: the model's inverse takes no swing within that noise for a reversal of the
-    load.
+    load. ``slowest_per_s`` is the least relaxation rate that a fit may take, less where recordings are long.
     """
 
     gain: float
@@ -87,12 +87,14 @@ class ExtendedModel:
     parts: tuple[Part, ...] = ()
     wall_ratio: float = USUAL_WALL_RATIO
     noise: float = 0.0
+    slowest_per_s: float = BASELINE[2].lower
 
     # -- parameters as one vector ------------------------------------------------------------------------------
     @cached_property
     def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
         """(name of the effect or "baseline", parameter) in the order of `theta`."""
-        own = [("baseline", parameter) for parameter in BASELINE]
+        gain, share, rate = BASELINE
+        own = [("baseline", one) for one in (gain, share, replace(rate, lower=self.slowest_per_s))]
         return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
 
     @property

@@ -14,12 +14,12 @@ from told_columns import MODEL, SCALE, STANDARD, STEP_S, past_columns, session_u
 
 from smartshoe import Recording
 from smartshoe.diagnosis._baseline import (
-    POLES_PER_S,
     SHARE,
     USUAL,
     _wall_ratio,
     baseline_of,
     has_negative_gain,
+    poles_per_s,
     with_usual_arm,
 )
 from smartshoe.diagnosis._likelihood import within_bounds
@@ -102,7 +102,7 @@ def test_a_sensor_that_only_lags_is_followed_as_closely_as_by_least_squares(lag_
     """Up to 98 % may relax, whatever the pole, so that none of the grid's poles is better at any share."""
     sessions = _lagging_sessions(lag_s)
     found = baseline_of(sessions, SCALE)
-    for pole in POLES_PER_S[10:]:
+    for pole in poles_per_s(1.0)[10:]:
         for share in (0.5, 5.0, 20.0, SHARE.upper):
             other = replace(MODEL, relaxing_share=share, relaxation_rate_per_s=float(pole) * (1.0 + share))
             assert _squares(found, sessions) <= 1.001 * _squares(other, sessions)
@@ -160,7 +160,8 @@ def test_a_reading_that_falls_under_load_has_a_plain_baseline() -> None:
     assert (usual.gain, usual.relaxing_share, usual.relaxation_rate_per_s) == (1.0, 0.08, 0.22)
     # A unit as the paper's are: what a held full scale of 800 N reads is all of it.
     assert (USUAL.gain, USUAL.full_scale_load_n, USUAL.full_scale_reading) == (1.0, 800.0, 100.0)
-    assert POLES_PER_S[[0, -1]] == pytest.approx([0.01, 50.0])
+    assert poles_per_s(1.0)[[0, -1]] == pytest.approx([0.01, 50.0])
+    assert poles_per_s(20.0)[[0, -1]] == pytest.approx([0.0005, 50.0])
 
 
 @pytest.mark.parametrize(("ratio", "is_told"), [(1.019, False), (1.021, True), (49.9, True), (50.1, False)])

@@ -484,8 +484,8 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     (said,) = limit_own_gains(gains)
     assert said.startswith(
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
-        " d and 1 more, for example because the unit slips: all else is judged with this allowed for; no model can"
-        " predict the gain of another recording"
+        " d and 1 more, for example because the unit slips: causes are judged with this allowed for, what is left over"
+        " is not; no model can predict the gain of another recording"
     )
 
 

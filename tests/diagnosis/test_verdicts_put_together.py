@@ -19,7 +19,7 @@ def test_what_is_off_elsewhere_is_held_against_what_was_fitted_at_the_same_rate(
     for parts.beyond, within in ((0.0, 0.07), (0.09, 0.09)):
         parts.seen.clear()
         run_diagnosis(parts)
-        assert parts.seen["held_out_excess"][0] == ([FINE], [f"{FINE} 2"], within, STANDARD)
+        assert parts.seen["held_out_excess"][0] == ([FINE], ["fine 2"], within, STANDARD)
 
 
 def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explained(parts: Any) -> None:
@@ -33,7 +33,7 @@ def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explai
         assert run_diagnosis(parts).verdict == verdict
         sessions, residuals, left, thresholds, known, before = parts.seen["untested_rms"][0]
         assert before is None
-        assert (sessions, residuals) == ([FINE], [f"{FINE} 2"])  # at full rate
+        assert (sessions, residuals) == ([FINE], ["fine 2"])  # at full rate
         assert (left is parts.kinds[1], thresholds, known) == (True, STANDARD, 0.0)
         assert parts.seen["unexplained_remark"][0][1:3] == (0.0, unproven)
 
@@ -73,7 +73,7 @@ def test_a_simulation_is_not_good_enough_where_no_test_would_show_what_is_left(p
         assert run_diagnosis(parts).verdict == verdict
         if not is_tested:
             before = parts.seen["untested_rms"][0][5]
-            assert before == ([f"{FINE} 0"] if names else None)  # what the plain model leaves
+            assert before == (["fine 0"] if names else None)  # what the plain model leaves
 
 
 def test_what_an_effect_without_a_name_moves_is_not_explained(parts: Any) -> None:
@@ -147,7 +147,7 @@ def test_no_more_can_be_explained_than_is_left_beyond_noise_where_it_is_judged(p
         told = run_diagnosis(parts)
         assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - judged**2) / 0.04))
         sessions, residuals, thresholds = parts.seen["held_out_rms"][0]
-        assert (sessions, residuals, thresholds) == ([FINE], [f"{FINE} 2"], STANDARD)  # at full rate
+        assert (sessions, residuals, thresholds) == ([FINE], ["fine 2"], STANDARD)  # at full rate
     parts.seen.clear()
     parts.judged = 1.0
     told = run_diagnosis(parts)  # nothing shows that any of it is noise

@@ -69,7 +69,17 @@ def test_a_zero_is_named_from_so_many_of_its_deviations_on(monkeypatch: pytest.M
     assert (found["load"].value, found["load"].size) == (-0.02, pytest.approx(0.016))
     assert (found["reading"].value, found["reading"].size) == (pytest.approx(-0.04), pytest.approx(0.04))
     assert found["load"].sd == found["reading"].sd == pytest.approx(STANDARD.zero_sd)
-    assert _seen(monkeypatch, [(0.02, -0.05, 0.0)], replace(SCALE, unit=VOLT)) == {}
+
+
+def test_where_zero_is_a_convention_only_a_load_below_nothing_is_a_tare(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Volts at rest say nothing, and a positive load may be borne; but no pressed unit bears less than nothing."""
+    volts = replace(SCALE, unit=VOLT)
+    assert _seen(monkeypatch, [(0.02, -0.05, 0.0)], volts) == {}
+    for by, is_named in ((0.999, False), (1.001, True)):
+        found = _seen(monkeypatch, [(-by * MANY * STANDARD.zero_sd, -0.05, 0.0)], volts)
+        assert set(found) == ({"load"} if is_named else set())
+    found = _seen(monkeypatch, [(-0.02, 0.3, 0.0)], volts)
+    assert (found["load"].value, found["load"].size) == (0.02, pytest.approx(0.016))
 
 
 def test_a_reading_that_agrees_with_the_load_or_is_far_off_is_no_zero(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,6 @@ from smartshoe.models.effects import effect
 FAULT: Any = SimpleNamespace(kind="gaps", recording=0, error=0.0, lines_hz=())
 SCREENED = ("delay", "flexible_lag", "linear_leak", "dead_band", "rate_gain", "warm_up")
 SCREENING = tuple((name, float(k)) for k, name in enumerate(SCREENED))
-FINE: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.05))
 PLAIN_N, EXTENDED_N = ForceError(8.0, 9.0), ForceError(6.0, 7.0)
 FILTER: Any = SimpleNamespace(not_inverted=(), moved_by_the_clock={}, lags_left_s={})  # undoes all
 
@@ -45,6 +44,17 @@ class _Session:
     @property
     def recording(self) -> Any:
         return SimpleNamespace(sensor=SimpleNamespace(unit=SCALE.unit))
+
+
+class _AtFullRate(_Session):
+    """The same, read at 20 Hz."""
+
+    @property
+    def conditions(self) -> Any:
+        return SimpleNamespace(step_s=0.05)
+
+
+FINE: Any = _AtFullRate("fine", 0, np.array([True, False, True]))
 
 
 def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
@@ -86,9 +96,10 @@ def told_parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         wall_ratio=[],
     )
 
-    def structure(sessions: Any, residuals: Any, thresholds: Any, quick: Any = None) -> Any:
+    def structure(sessions: Any, residuals: Any, thresholds: Any, quick: Any = None, fine: Any = None) -> Any:
         made.seen.setdefault("structure", []).append((list(sessions), list(residuals)))
         made.seen.setdefault("quick", []).append(quick)
+        made.seen.setdefault("fine", []).append(fine)
         return made.kinds[len(made.seen["structure"]) - 1]
 
     def answer(name: str, value: Any) -> None:

@@ -7,6 +7,7 @@ stands at the chain's end. So every strength is a share of full scale.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from copy import copy
@@ -73,6 +74,11 @@ class EffectParameter:
             return self
         lower, upper = min(self.farthest, self.lower), max(self.farthest, self.upper)
         return replace(self, lower=lower, upper=upper, farthest=None)
+
+    def stretched(self, by: float) -> EffectParameter:
+        """The parameter, a time, with longer bounds."""
+        farthest = None if self.farthest is None else by * self.farthest
+        return replace(self, upper=by * self.upper, farthest=farthest)
 
     def is_where_kind_ends(self, value: float) -> bool:
         """Whether a value lies at a bound beyond which the effect is of another kind."""
@@ -296,6 +302,28 @@ class Effect(ABC):
     def of_any_sensor(self) -> Effect:
         """The effect for a reading that is no pressure: stress, or the conduction of a polymer, may fall in holds."""
         return self if self.of_either_sign is None else _of_either_sign(self, *self.of_either_sign)
+
+    def lasting(self, stretch: float) -> Effect:
+        """The effect for recordings ``stretch`` times longer than usual: its slowest time constants grow in proportion.
+
+        Shapes that are searched are added up to there, from a factor of two to one of four apart.
+        """
+        slow = {p.name for p in self.parameters if p.unit == "s" and p.null is None}
+        if stretch <= 1.0 or not slow:
+            return self
+        longer = tuple(p.stretched(stretch) if p.name in slow else p for p in self.parameters)
+        count = math.ceil(math.log(stretch, 4.0)) if stretch >= 2.0 else 0
+        more = [
+            {name: value * stretch ** (k / count) if name in slow else value for name, value in slowest.items()}
+            for k in range(1, count + 1)
+            for slowest in self._slowest_shapes(slow)
+        ]
+        return _variant(self, parameters=longer, shapes=(*self.shapes, *more))
+
+    def _slowest_shapes(self, slow: Collection[str]) -> list[Mapping[str, float]]:
+        """The shapes of the longest times of the parameters named ``slow``."""
+        times = [tuple(shape[name] for name in slow if name in shape) for shape in self.shapes]
+        return [shape for shape, time in zip(self.shapes, times, strict=True) if time and time == max(times)]
 
     def widened_at(self, values: Array) -> Effect:
         """The effect with each bound that ``values`` lie at moved to the ``farthest``; itself where there is none."""
