@@ -203,7 +203,7 @@ def limit_relaxation_range(
         return []
     end_s = 1.0 / (model.slowest_per_s if slow else RATE.upper)
     return [
-        f"the baseline's relaxation is at the end of its range, {end_s:.3g} s:"
+        f"the baseline's relaxation is at the end of its range, {rounded(end_s, 3)} s:"
         f" a unit that relaxes {'more slowly' if slow else 'faster'} cannot be followed"
         + (", and what is named may stand for this" if beside_names else "")
     ]
