@@ -404,6 +404,7 @@ def test_what_gives_way_in_holds_is_a_relaxation_where_the_reading_is_no_pressur
     assert float(np.sqrt(np.mean((force - runs[2].force_n) ** 2))) < 0.01 * PEAK_N
 
 
+@pytest.mark.long
 def test_a_resistance_that_gives_way_over_many_times_is_none_of_a_gas() -> None:
     runs = [_giving_way(seed, {0.3: 0.1, 3.0: 0.1, 30.0: 0.1, 300.0: 0.1}) for seed in range(3)]
     found = diagnose(runs[:2], hold_out=runs[2])

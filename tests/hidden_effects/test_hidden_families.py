@@ -12,7 +12,7 @@ from smartshoe.diagnosis import diagnose
 PROTOCOLS = ("mixed", "shuffled")
 IMITATE = frozenset({"delay", "sensor_lag"})  # a lag of a tenth of a second is late by as much as a delay, edges aside
 
-DAILY = (("permanent_set", "zero_drift"), ("mullins_softening", "cycle_conditioning"))
+DAILY = (("mullins_softening", "cycle_conditioning"),)
 
 
 # A second relaxation at the end of its kind, 120 s, takes the set's part, and what goes with it is not sure.

@@ -37,6 +37,7 @@ def test_true_structure_is_chosen_by_bic_and_by_yic():
     assert (steadiest.poles, steadiest.zeros) == (3, 1)
 
 
+@pytest.mark.long
 def test_error_on_left_out_experiments_tells_too_few_poles_and_comes_down_to_the_noise():
     pairs = [made(250, seed) for seed in (2, 3, 4)]
     u, y = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
