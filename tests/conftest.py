@@ -16,7 +16,7 @@ from hypothesis.internal.conjecture import providers
 
 settings.register_profile(
     "ci",
-    max_examples=35,  # HYPOTHESIS_PROFILE=bank draws thirty times as many, of the laws that say no number of their own
+    max_examples=50,  # HYPOTHESIS_PROFILE=bank draws twenty times as many, of the laws that say no number of their own
     derandomize=True,
     deadline=None,
     print_blob=True,
