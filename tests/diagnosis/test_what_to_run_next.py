@@ -280,7 +280,7 @@ def test_a_slow_log_is_asked_for_protocols_of_its_own_pace() -> None:
 
     It ended in "steps holds one sample", of a protocol that nobody had given; then ramps of a second were proposed.
     """
-    one = recording(MODEL.with_part(effect("play_hysteresis"), effect("play_hysteresis").begun(sizes=1.0)))
+    one = recording(MODEL.with_part(effect("wall_hardening"), effect("wall_hardening").begun(sizes=1.0)))
     found = diagnose(replace(one, time_s=5000.0 * one.time_s))
     assert found.causes
     assert found.next_experiment is not None
