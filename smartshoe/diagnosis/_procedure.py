@@ -233,13 +233,13 @@ def _structures_of(
     # A line may be told of what is left for what is held out, which decides no name.
     partly_held = {one.index for one in sessions if one.fitted.any() and one.judged.any()}
     of_names = [*of_faults, *(one for one in of_residuals if one.recording not in partly_held)]
-    thinned, quick = after.thinned, after.fine
+    thinned, fine = after.thinned, after.fine
     if len(of_names) < len(told):
-        thinned, quick = _without_tones(given, *_residuals(found.fit.model, given), of_names)
+        thinned, fine = _without_tones(given, *_residuals(found.fit.model, given), of_names)
     return _Structures(
         before.structure,
         after.structure,
-        _structure_where_fitted(given, thinned, quick),
+        _structure_where_fitted(given, thinned, fine),
         fault_rms(faults, sessions, given.scale),
         before.fine,
         after.fine,

@@ -24,7 +24,7 @@ from smartshoe.diagnosis._jittered import with_sampling_jitter
 from smartshoe.diagnosis._load_cycles import cycles_of
 from smartshoe.diagnosis._rest import load_at_rest, with_level_rests
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.integrity.thresholds import PROTOCOL_S, Thresholds, largest_of_noise
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise, stretch_by
 from smartshoe.models.effects import Conditions, Effect
 from smartshoe.recording import Recording
 from smartshoe.signals.masks import runs_of
@@ -102,12 +102,12 @@ class Session:
 
 
 def stretch_of(sessions: Sequence[Session]) -> float:
-    """How many times longer than `PROTOCOL_S` the longest fitted recording is, at least once.
+    """`stretch_by` of the longest fitted recording.
 
     So much slower may a unit be than the usual ones. What is slower still is not told from a drift.
     """
     longest_s = max((float(np.ptp(one.conditions.time_s)) for one in fitted_of(sessions)), default=0.0)
-    return max(longest_s / PROTOCOL_S, 1.0)
+    return stretch_by(longest_s)
 
 
 def fitted_of(sessions: Iterable[Session]) -> tuple[Session, ...]:

@@ -218,8 +218,8 @@ def zeros_of(
     as_read = [float(np.mean(readings + one)) for one in (drifted, as_begun)]
     z_limit = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= z_limit * np.array([load_sd, reading_sd])
-    if not (is_gauge or commanded):  # the reading's zero is a convention; but no pressed unit bears less than nothing
-        return (Zero(machine, -load, load_sd, abs(load * model.gain)),) if is_clear[0] and load < 0.0 else ()
+    # Where the reading's zero is a convention a load may be borne; but no pressed unit bears less than nothing.
+    is_clear[0] &= is_gauge or commanded or load < 0.0
     if is_gauge and abs(reading - load) < z_limit * borne_sd:
         return ()  # the reading agrees with the load, so that the unit bears it
     if is_gauge and is_clear.all() and not commanded and thresholds.clear * reading > load > 0.0:

@@ -22,6 +22,11 @@ def threshold(
 PROTOCOL_S = 300.0  # the length of recordings for which all ranges of times were chosen
 
 
+def stretch_by(longest_s: float) -> float:
+    """How many times longer than `PROTOCOL_S` recordings of up to ``longest_s`` are, at least once."""
+    return max(longest_s / PROTOCOL_S, 1.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Thresholds:
     """The numbers that a diagnosis decides by. Carried in the result and printed in the page; `described` lists them.
@@ -196,7 +201,7 @@ class Thresholds:
 
     def lasting(self, longest_s: float) -> Thresholds:
         """The numbers for recordings of up to ``longest_s``: ``memory_s`` goes on for each decade beyond the usual."""
-        decades = int(math.log10(max(longest_s / PROTOCOL_S, 1.0)))
+        decades = int(math.log10(stretch_by(longest_s)))
         longer = tuple(self.memory_s[-1] * 10.0**k for k in range(1, decades + 1))
         return replace(self, memory_s=(*self.memory_s, *longer)) if longer else self
 

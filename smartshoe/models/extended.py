@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,13 @@ BASELINE = (
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 2550.0, 0.2),
 )
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
+
+
+@cache
+def _baseline_parameters(slowest_per_s: float) -> tuple[EffectParameter, ...]:
+    """The baseline's parameters where its relaxation rate may be as low as ``slowest_per_s``."""
+    *others, rate = BASELINE
+    return (*others, replace(rate, lower=slowest_per_s))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +100,7 @@ class ExtendedModel:
     @cached_property
     def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
         """(name of the effect or "baseline", parameter) in the order of `theta`."""
-        gain, share, rate = BASELINE
-        own = [("baseline", one) for one in (gain, share, replace(rate, lower=self.slowest_per_s))]
+        own = [("baseline", one) for one in _baseline_parameters(self.slowest_per_s)]
         return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
 
     @property

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 from test_diagnosis_parts import RATE_HZ, recording, sessions_of
-from test_known_units import HOLDS_N, TRIANGLES_N, _solid, _times
+from test_long_recordings import plain, told_of
 
-from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _gauss_markov
 from smartshoe.diagnosis._gauss_markov import _covariance, gauss_markov_of
 from smartshoe.diagnosis._jittered import jitter_s, with_sampling_jitter
@@ -250,13 +249,6 @@ def test_what_switches_is_structure_though_it_does_so_while_the_load_is_held(ses
 @pytest.mark.parametrize("stride", [5, 20])
 def test_white_noise_of_a_slow_log_is_white_and_no_effect(stride: int) -> None:
     """The average that a log passes before it is thinned spans several samples at 20 or 5 Hz, and correlates them."""
-    rng, runs = np.random.default_rng(0), []
-    for name, load in (("triangles", TRIANGLES_N), ("holds", HOLDS_N), ("again", TRIANGLES_N)):
-        read = 2.0 * _solid(load, 5.0)[::stride]
-        noisy = read + 0.4 * rng.standard_normal(read.size)
-        runs.append(
-            Recording.from_arrays(time_s=_times(load)[::stride], force_n=load[::stride], pressure_mbar=noisy, name=name)
-        )
-    found = diagnose(runs[:2], hold_out=runs[2:])
+    found = told_of(plain, stride=stride, noise_mbar=0.4)
     assert found.verdict == "adequate"
     assert found.data_faults == ()

@@ -19,7 +19,7 @@ STANDARD = Thresholds()
 TAU_S, SETTLES_S, SECOND_S = 5.0, 60.0, 40.0
 
 
-def _plain(load: Array) -> Array:
+def plain(load: Array) -> Array:
     return 2.0 * _solid(load, TAU_S)
 
 
@@ -28,19 +28,21 @@ def _creeping(load: Array) -> Array:
 
 
 def _warming(load: Array) -> Array:
-    return _plain(load) + 0.04 * PEAK_N * (1.0 - np.exp(-_times(load) / SETTLES_S))
+    return plain(load) + 0.04 * PEAK_N * (1.0 - np.exp(-_times(load) / SETTLES_S))
 
 
-def _told(unit: Callable[[Array], Array], slower: float) -> Diagnosis:
-    """The diagnosis of a unit that is so many times slower, under loads that are as much slower."""
+def told_of(
+    unit: Callable[[Array], Array], *, slower: float = 1.0, stride: int = 2, noise_mbar: float = 0.05
+) -> Diagnosis:
+    """The diagnosis of a unit so many times slower, under loads that are, logged at every ``stride``-th sample."""
     rng, runs = np.random.default_rng(0), []
     for name, load in (("triangles", TRIANGLES_N), ("holds", HOLDS_N), ("again", TRIANGLES_N)):
-        read = unit(load)[::2]
+        read = unit(load)[::stride]
         runs.append(
             Recording.from_arrays(
-                time_s=slower * _times(load)[::2],
-                force_n=load[::2],
-                pressure_mbar=read + 0.05 * rng.standard_normal(read.size),
+                time_s=slower * _times(load)[::stride],
+                force_n=load[::stride],
+                pressure_mbar=read + noise_mbar * rng.standard_normal(read.size),
                 name=name,
             )
         )
@@ -49,7 +51,7 @@ def _told(unit: Callable[[Array], Array], slower: float) -> Diagnosis:
 
 def test_a_slow_unit_is_as_good_as_a_quick_one() -> None:
     slower = 1000.0
-    told = _told(_plain, slower)
+    told = told_of(plain, slower=slower)
     assert told.verdict == "adequate"
     pole_s = 1.0 / (told.model.relaxation_rate_per_s / (1.0 + told.model.relaxing_share))
     assert pole_s == pytest.approx(slower * TAU_S, rel=0.02)
@@ -63,7 +65,7 @@ def test_what_a_quick_unit_has_a_slow_one_has_by_the_same_law(
     unit: Callable[[Array], Array], name: str, time_s: float | None
 ) -> None:
     """Seconds or minutes: the same samples have the same cause, of the same size, in another unit of time."""
-    quick, slow = (_told(unit, slower).causes for slower in (1.0, 100.0))
+    quick, slow = (told_of(unit, slower=slower).causes for slower in (1.0, 100.0))
     assert [one.name for one in quick] == [one.name for one in slow] == [name]
     strength, time = (tuple(quick[0].parameters)[k] for k in (0, 1))
     assert slow[0].parameters[strength].value == pytest.approx(quick[0].parameters[strength].value, rel=0.01)
