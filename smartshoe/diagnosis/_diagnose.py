@@ -15,7 +15,7 @@ from smartshoe.diagnosis._result import Diagnosis
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of, unit_of
-from smartshoe.integrity import Integrity, examine, twins
+from smartshoe.integrity import Integrity, examine, twins, twins_by_noise
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
 
@@ -75,7 +75,7 @@ def diagnose(
     decided = decided_by(thresholds, material).lasting(max(one.duration_s for one in fitted))
     integrity = examine(everything, decided, count)
     everything = [*integrity.recordings]
-    shared = twins(everything, decided)
+    shared = twins_by_noise(everything, decided) | twins(everything, decided)
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
     alone = [mask & ~shared[k].at if k in shared else mask for k, mask in enumerate(integrity.usable)]
     copies = {k: one.says for k, one in shared.items() if alone[k].sum() < decided.least_samples}
@@ -125,8 +125,8 @@ def _pulled_reason(recording: Recording, thresholds: Thresholds) -> str | None:
         return None
     return (
         f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
-        " which bears compression only (turn the sign of the load, or set it to zero at rest; where its mean was taken"
-        " out, add in the file what makes all of it positive)"
+        " which bears compression only (load it over its range; turn the sign of the load, or set it to zero at rest;"
+        " where its mean was taken out, add in the file what makes all of it positive)"
     )
 
 

@@ -258,7 +258,7 @@ def limit_wall_ratio(model: ExtendedModel, sessions: Sequence[Session], threshol
             f"correct effective_area_m2: the declared one gives an N outside {least:g} to {most:g}, which no tube has"
         )
     elif rms_difference(sessions, model, replace(model, wall_ratio=stiffest)) > thresholds.material:
-        mend = "declare effective_area_m2"
+        mend = "declare the tube's effective area, in a file by a line '# effective_area_m2: ...' above the table"
     else:
         return []
     return [

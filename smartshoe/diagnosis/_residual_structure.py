@@ -155,7 +155,7 @@ def worst_place(sessions: Sequence[Session], residuals: Sequence[Array], thresho
     np.add.at(table, (direction, level), power)
     np.add.at(share, (direction, level), 1.0 / power.size)
     d, k = np.unravel_index(int(np.argmax(table)), table.shape)
-    doing = ("while the load is held", "while loading", "while unloading")[int(d)]
+    doing = ("while the load stands", "while loading", "while unloading")[int(d)]
     numbers = np.array(names)
     worst = max(range(len(sessions)), key=lambda i: float(power[numbers == i].mean()))
     own = power[numbers == worst]

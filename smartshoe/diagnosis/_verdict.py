@@ -76,7 +76,7 @@ def held_out_excess(
 
 
 def names_in(causes: Sequence[Cause], unnamed: int) -> str:
-    """The causes as "a, b and perhaps c", with the number of effects that have no name."""
+    """The causes as "a, b and perhaps c", with the number of effects that are not named as causes."""
     names = [cause.name for cause in causes if cause.confidence >= 0.5]
     names += [f"perhaps {cause.name}" for cause in causes if cause.confidence < 0.5]
     names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
@@ -148,7 +148,7 @@ def sentence_of(
     if verdict == "adequate":
         return f"{good}{left and f'{left}, no more than small imperfections of a good unit add up to'}"
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:
-        return f"{good}{left}: the extended model is good to {by_all}, with effects that have no name"
+        return f"{good}{left}: the extended model is good to {by_all}, with effects that are not named as causes"
     if verdict == "unexplained":
         why = "no cause can be named from this data (see its limits)" if withheld else None
         return f"{good}{left}, and {why or 'no effect of the catalogue accounts for it'}"

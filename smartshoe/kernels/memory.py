@@ -111,12 +111,14 @@ def relays_undone(signal, strength, half_widths, closed, open_, levelling, state
         low, high = y - 2.0 * strength, y + 2.0 * strength
         f, under, over, stays = low, 0.0, 0.0, 0
         for i in range(STEPS):
-            moved[:] = state
+            for j in range(state.size):
+                moved[j] = state[j]
             left = f - y - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, moved)
             if abs(left) <= SOLVED:
                 break
             f, low, high, under, over, stays = closer(i, f, left, low, high, under, over, stays)
-        state[:] = moved
+        for j in range(state.size):
+            state[j] = moved[j]
         out[k] = f
 
 

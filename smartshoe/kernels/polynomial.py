@@ -84,7 +84,8 @@ def run_uneven(  # type: ignore[no-untyped-def]
     count, m = out.shape
     size = m + 2
     state = np.zeros(size)
-    state[:m] = start
+    for i in range(m):
+        state[i] = start[i]
     term = np.empty(size)
     after = np.empty(size)
     n = u.size

@@ -532,7 +532,7 @@ def replace_fitted(session: Any, fitted: NDArray[np.bool_]) -> Any:
 @pytest.mark.parametrize(
     ("level", "rate", "words"),
     [
-        (0.0, 0.0, "0-25 % of full load while the load is held"),
+        (0.0, 0.0, "0-25 % of full load while the load stands"),
         (0.25, 1.0, "25-50 % of full load while loading"),
         (0.499, -1.0, "25-50 % of full load while unloading"),
         (0.75, 1.0, "75-100 % of full load while loading"),
@@ -553,7 +553,7 @@ def test_the_place_of_the_largest_part_is_said(level: float, rate: float, words:
     assert "; the worst stretch is loud, " in said
 
 
-@pytest.mark.parametrize(("by", "words"), [(0.99, "while the load is held"), (1.0, "while loading")])
+@pytest.mark.parametrize(("by", "words"), [(0.99, "while the load stands"), (1.0, "while loading")])
 def test_a_load_is_held_below_the_slowest_ramp(by: float, words: str) -> None:
     one = _session(np.full(100, 0.5))
     one.conditions.cache["rate_per_s"] = np.full(100, by * STANDARD.still_per_s)

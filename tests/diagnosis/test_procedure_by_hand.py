@@ -198,7 +198,7 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
     assert _said("explained", "dead_band", "delay", "rate_gain").endswith("to 10 % with dead band, delay and rate gain")
     rest = "over all recordings 3.4 % repeats and is not explained"
     assert _said("partly_explained", "delay") == f"{good}, and to 10 % with delay; {rest}"
-    unsure = "the extended model is good to 10 %, with effects that have no name"
+    unsure = "the extended model is good to 10 %, with effects that are not named as causes"
     assert _said("unexplained") == f"{good}; {rest}: {unsure}"
     no_effect = "and no effect of the catalogue accounts for it"
     assert _said("unexplained", best=BEFORE) == f"{good}; {rest}, {no_effect}"

@@ -348,7 +348,7 @@ def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Se
     here = (loads >= 0.5) & (loads < 0.75) & (rates > STANDARD.still_per_s)
     assert samples == pytest.approx(100.0 * float(np.mean(here)), abs=1.0)
     held = [1.0 * (s.conditions.load < 0.1) * (np.abs(s.conditions.rate_per_s) < 1e-3) for s in sessions]
-    assert "at 0-25 % of full load while the load is held" in worst_place(sessions, held, STANDARD)
+    assert "at 0-25 % of full load while the load stands" in worst_place(sessions, held, STANDARD)
     falling = [1.0 * (s.conditions.load > 0.8) * (s.conditions.rate_per_s < -0.05) for s in sessions]
     assert "at 75-100 % of full load while unloading" in worst_place(sessions, falling, STANDARD)
 

@@ -269,7 +269,7 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     assert said(causes[:1], small)[1] == f"{good}, and to 1 % with dead band"
     rest = f"over all recordings {100 * large:.2g} % repeats and is not explained"
     assert said([], large) == (
-        "unexplained", f"{good}; {rest}: the extended model is good to 1 %, with effects that have no name"
+        "unexplained", f"{good}; {rest}: the extended model is good to 1 %, with effects that are not named as causes"
     )  # fmt: skip
     assert said(causes[:2], large) == ("partly_explained", f"{good}, and to 1 % with dead band and delay; {rest}")
     # What laws usually depart by may be left, but not where no law of the kind follows.

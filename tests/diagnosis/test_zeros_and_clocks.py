@@ -351,7 +351,7 @@ def test_what_a_leak_or_heat_does_goes_with_how_stiff_the_wall_is_which_is_said_
     assert limit_wall_ratio(model, sessions, sensitive) == [
         "the wall's stiffness relative to the gas is not known (N = 1.6 is assumed, units of the paper have 1.51 to"
         " 1.78): rates of leaks and times of heat depend on it, and may lie outside their intervals (declare"
-        " effective_area_m2)"
+        " the tube's effective area, in a file by a line '# effective_area_m2: ...' above the table)"
     ]
     for runs in ((declared, bare), (bare, declared)):
         told, scale = _sessions(*runs)

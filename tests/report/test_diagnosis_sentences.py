@@ -158,7 +158,7 @@ def test_parameters_of_an_equation_that_is_not_in_the_model_are_told_as_such() -
 
 
 def test_what_is_left_is_told_of_the_model_that_leaves_it() -> None:
-    """Without a cause, but with effects that have no name, it is what the baseline leaves."""
+    """Without a cause, but with effects that are not named as causes, it is what the baseline leaves."""
     made = case("unexplained")
     assert made.baseline is not None
     assert made.extended is not None
@@ -178,7 +178,7 @@ def test_what_is_left_is_told_of_the_model_that_leaves_it() -> None:
 def test_what_effects_without_a_name_follow_is_not_called_explained() -> None:
     made = replace(case("unexplained"), minor=("second_relaxation",), explained_percent=90.5)
     assert shares_text(made) == (
-        "8 % of the error's variance is noise; of the rest 98 % is followed by effects that have no name."
+        "8 % of the error's variance is noise; of the rest 98 % is followed by effects that are not named as causes."
     )
     assert shares_text(replace(made, causes=(LEAK_CAUSE,))).endswith("98 % is explained.")
     assert shares_text(replace(made, explained_percent=0.3)).endswith("of the rest none is explained.")
@@ -356,7 +356,7 @@ def test_where_no_test_tells_structure_from_noise_no_share_is_called_noise() -> 
 def test_structure_that_is_left_is_said_where_the_table_beside_it_has_it() -> None:
     made = case("one cause")
     assert made.extended is not None
-    none = "Taken over the whole record, no structure that matters stands out of the noise."
+    none = "Over the whole record the extended model leaves no structure that matters."
     for rms, said in (
         (0.0, none),
         (0.0001, none),

@@ -22,7 +22,8 @@ class LinearLeak(CoreEffect):
         EffectParameter(
             "leak_rate",
             "1/s",
-            "share of the air's deformation lost a second; a held reading falls at 1 - 1/N of it, 0.375 where N is 1.6",
+            "share of the air's deformation lost a second; a held reading falls at 1 - 1/N of it, at 0.375 for the N of"
+            " 1.6 that is assumed where no effective area is declared",
             0.0,
             0.0,
             5.0,

@@ -201,7 +201,7 @@ def how_much(diagnosis: Diagnosis) -> str | None:
         f" ({plain(share_of_full_scale(diagnosis, before.rmse), 2)} % of full scale, rms)"
     )
     if after.rmse < 0.98 * before.rmse:
-        what = "what was found" if diagnosis.causes else "effects that have no name"
+        what = "what was found" if diagnosis.causes else "effects that are not named as causes"
         said += (
             f"; with {what} it is off by {with_unit(plain(after.rmse), after.unit)}"
             f" ({plain(share_of_full_scale(diagnosis, after.rmse), 2)} %)"
@@ -413,7 +413,7 @@ def followed(diagnosis: Diagnosis) -> str:
     If only unnamed effects remove it, nothing is explained.
     """
     is_named = diagnosis.causes or not diagnosis.minor
-    return "explained" if is_named else "followed by effects that have no name"
+    return "explained" if is_named else "followed by effects that are not named as causes"
 
 
 def percent_of_whole(percent: float) -> str:
@@ -463,7 +463,7 @@ def nothing_left(diagnosis: Diagnosis) -> str:
         return "There is too little data to tell structure from noise in what is left."
     of_scale = share_of_full_scale(diagnosis, after.structure_rms)
     if of_scale <= 100.0 * diagnosis.thresholds.material:
-        return "Taken over the whole record, no structure that matters stands out of the noise."
+        return "Over the whole record the extended model leaves no structure that matters."
     return (
         f"Beside noise {with_unit(plain(after.structure_rms), after.unit)} ({plain(of_scale, 2)} % of full scale, rms)"
         " is left over the whole record: no more than small imperfections of a good unit, faults of the data, or"
