@@ -18,7 +18,6 @@ from smartshoe.devices.joining import Alignment, align_reading, coarse
 from smartshoe.errors import InputError
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Channel, Recording
-from smartshoe.signals import loading
 from smartshoe.signals.masks import runs_of
 
 FOLLOWS = 0.8  # correlation above which a reading follows the load that presses it
@@ -30,6 +29,7 @@ BRIDGED_S = 0.05  # longest time to the nearest sample of the stream for a momen
 LARGEST_LOSS = 0.02
 DRIFT_SHARE = 0.02  # of the reading's span
 PEAK_TOLERANCE = 0.05
+AT_REST, PRESSED = 0.02, 0.04  # of the protocol's peak: a machine's log is at rest below one, presses above the other
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,18 +155,36 @@ def other_test(pressing: Pressing) -> PressingFault | None:
 
 
 def too_few_repeats(pressing: Pressing) -> PressingFault | None:
-    """The machine stopped before the protocol's end."""
+    """The machine stopped before the protocol's end.
+
+    A log is whole if it presses as often from rest as asked, for as long in all, and ends at a load that the protocol
+    ends at. Cycles within a press are not counted: noise adds some and takes some where a load turns by just as much as
+    counts. Rests may differ in length, and the last one need not be in the log.
+    """
     if pressing.load is None:
         return None
-    corner_s, corner_n = pressing.protocol.corners()
-    time_s = np.arange(0.0, corner_s[-1], 0.01)
-    asked = len(loading.cycles(time_s, np.interp(time_s, corner_s, corner_n)))
-    done = len(loading.cycles(pressing.load.time_s, pressing.load.force_n))
-    if done >= asked:
+    protocol, time_s = pressing.protocol, pressing.load.time_s
+    corner_s, corner_n = protocol.corners()
+    load_n = pressing.load.force_n - np.quantile(pressing.load.force_n, AT_REST)
+    rest_n, press_n = AT_REST * protocol.peak_load_n, PRESSED * protocol.peak_load_n
+    step_s = float(np.median(np.diff(time_s)))
+    last_n = float(np.max(protocol.load_at(corner_s[-1] - step_s * np.array([0.0, 0.5, 1.0]))))
+    end_n = float(np.min(load_n[-3:]))
+    if end_n > max(last_n, press_n):
+        return PressingFault(
+            "too_few_repeats",
+            f"the machine's log ends under a load of {end_n:.0f} N, before the end of {protocol.name}: run it to its"
+            " end",
+        )
+    # The asked presses are counted with twice the margin, so that noise below it takes none from a whole log.
+    asked, done = _presses(corner_n, 0.5 * rest_n, 2.0 * press_n), _presses(load_n, rest_n, press_n)
+    asked_s, done_s = _time_above(corner_s, corner_n, press_n), _time_above(time_s, load_n, press_n)
+    if done >= asked and done_s >= (1.0 - PEAK_TOLERANCE) * asked_s:
         return None
     return PressingFault(
         "too_few_repeats",
-        f"the machine pressed {done} times, {pressing.protocol.name} asks for {asked}: run it to its end",
+        f"the machine pressed {done} times, {done_s:.4g} s in all, {protocol.name} asks for {asked} times and"
+        f" {asked_s:.4g} s: run it to its end",
     )
 
 
@@ -227,6 +245,20 @@ AT_THE_END: tuple[Check, ...] = (
 def first_fault(checks: tuple[Check, ...], pressing: Pressing) -> PressingFault | None:
     """The first fault that one of ``checks`` finds; None if there is none."""
     return next((found for check in checks if (found := check(pressing)) is not None), None)
+
+
+def _presses(load_n: Array, rest_n: float, press_n: float) -> int:
+    """How often a load (n,) rises from below ``rest_n``, or from its start, to above ``press_n``."""
+    pressed = load_n[(load_n <= rest_n) | (load_n >= press_n)] >= press_n
+    return int(np.count_nonzero(pressed[1:] & ~pressed[:-1])) + int(pressed[:1].sum())
+
+
+def _time_above(time_s: Array, load_n: Array, level_n: float) -> float:
+    """How long in s the load, straight between the points ``time_s`` and ``load_n`` (n,), is above ``level_n``."""
+    low, high = np.minimum(load_n[1:], load_n[:-1]), np.maximum(load_n[1:], load_n[:-1])
+    span = high - low
+    share = np.divide(np.clip(high - level_n, 0.0, span), span, out=(high > level_n).astype(float), where=span > 0.0)
+    return float(np.sum(share * np.diff(time_s)))
 
 
 def _span(values: Array) -> float:
