@@ -72,6 +72,13 @@ class Coverage:
         """How the share is applied, as text for a person."""
         return "the same at each moment of a stance" if self.course is None else "by a course over the stance"
 
+    def knows_when(self, *, running: bool) -> bool:
+        """Whether peaks of whole forces are right: all load is on the units, or a course says when it is not.
+
+        A course for longer stances than a runner's says nothing of running.
+        """
+        return self.share == 1.0 or (self.course is not None and not (running and self.least_stance_s > 0.0))
+
     def whole(self, borne: Array, time_s: Array, contacts: Contacts) -> Array:
         """The force (n,) in N on the whole foot, from the force ``borne`` (n,) in N on its units."""
         if self.course is None:

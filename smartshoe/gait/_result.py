@@ -100,6 +100,10 @@ class GaitFindings(Shown):
         known = ", ".join(self._tables)
         raise UsageError(f"table {table!r} is not known of a {type(self).__name__}: use one of {known}")
 
+    def _counts(self) -> tuple[int, int]:
+        """The trial's numbers of strides and of events."""
+        return len(self.strides), len(self.events)
+
     def _summary_table(self) -> SummaryTable:
         """The figures that are single numbers, and the flags, as a table."""
         weight = self.forces.body_weight
@@ -108,9 +112,10 @@ class GaitFindings(Shown):
             for name, value in self.figures.items()
             if value is not None and not isinstance(value, Mapping)
         ]
+        strides, events = self._counts()
         said = "" if weight is None else f", body weight {significant(weight.value)} N ({weight.source})"
         return SummaryTable(
-            f"{self.activity}: {len(self.strides)} strides, {len(self.events)} events{said}",
+            f"{self.activity}: {strides} strides, {events} events{said}",
             ["figure", "value"],
             rows,
             [flag.says for flag in self.flags],
@@ -208,6 +213,9 @@ class DayResult(GaitFindings):
     event_count: int
     stride_count: int
     listed_s: float | None
+
+    def _counts(self) -> tuple[int, int]:
+        return self.stride_count, self.event_count
 
     def to_dict(self) -> dict[str, Any]:
         """The result in schema smartshoe.gait/1, with an additional object ``stream``."""

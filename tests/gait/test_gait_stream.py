@@ -25,6 +25,8 @@ from smartshoe.gait import _day as day
 from smartshoe.gait._day import DayResult
 from smartshoe.gait._sums import Moments
 from smartshoe.recording import Recording
+from smartshoe.report.gait.terminal import by_foot
+from smartshoe.report.numbers import plain
 from smartshoe.units import MILLIBAR
 
 # Sums in another order: what double precision leaves of them.
@@ -235,6 +237,20 @@ def test_lists_are_bounded_and_everything_is_handed_on(monkeypatch: pytest.Monke
     assert set(whole.to_dict()) < set(result)
 
 
+def test_the_mean_peak_is_of_all_strides_listed_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table's two rows of one mean, where the person walks more slowly after the last stride that is listed."""
+    monkeypatch.setattr(day, "LISTED", 100)
+    found = analyse_stream(in_blocks(various(), 3000))
+    listed = [stride.peak_n for stride in found.strides if stride.foot == "left" and stride.peak_n is not None]
+    rows = dict(by_foot(found))
+    for k, foot in enumerate(("left", "right")):
+        mean_n = found.to_dict()["summary"]["peak_n"][foot]["mean"]
+        assert rows["mean peak* ± 95 % (N)"][k].split(" ± ")[0] == plain(mean_n)
+        assert rows["peak force* (N)"][k].split(" (")[0] == plain(mean_n, 3)
+    assert abs(float(np.mean(listed)) / found.summary["peak_n"]["left"]["mean"] - 1.0) > 0.02
+    assert f"{found.stride_count} strides" in found.summary()
+
+
 def test_what_is_no_trial_is_refused() -> None:
     rng = np.random.default_rng(1)
     nothing = recorded(np.arange(40_000) / 200.0, {f"left_{r}_n": rng.normal(size=40_000) for r in ("heel", "toe")})
@@ -269,6 +285,8 @@ import numpy as np
 from simulators.people import Person, Walk, trial
 from smartshoe.gait import analyse_stream
 from smartshoe.recording import Recording
+from smartshoe.report.gait.terminal import by_foot
+from smartshoe.report.numbers import plain
 
 made = trial(Person(), Walk(1.3), 60.0, np.random.default_rng(1), sensors=False, noise_n=1.0).recording
 columns = {name: values for name, values in made.columns() if name != "time_s"}

@@ -13,7 +13,7 @@ from pages_made import gait_page, walked
 from simulators.people import Person, Walk, trial
 from smartshoe.gait import Coverage, GaitResult, analyse
 from smartshoe.recording import Recording
-from smartshoe.report.gait._page import verdict
+from smartshoe.report.gait._page import verdict, write_gait_page
 from smartshoe.report.gait.charts import left_and_right
 from smartshoe.report.gait.charts import trial as trial_chart
 from smartshoe.report.gait.terminal import by_foot, depends_on_coverage
@@ -49,6 +49,29 @@ def test_peaks_are_marked_where_nobody_gave_a_coverage(walk: GaitResult) -> None
 def test_the_peak_is_told_with_its_interval(walk: GaitResult) -> None:
     cells = dict(by_foot(walk))["mean peak* ± 95 % (N)"]
     assert all("±" in cell for cell in cells)
+
+
+def test_a_share_alone_gives_the_mean_peak_no_interval_that_misses_it(tmp_path: Path) -> None:
+    """The units bear all of push-off, so that a share of the impulse makes peaks a quarter too high."""
+    made = trial(Person(), Walk(1.3), 12.0, np.random.default_rng(1), sensors=False, noise_n=1.0, name="walk")
+    true_n = float(np.mean([stance.max() for stance in _stances(made.total_n["left"])]))
+    alone = analyse([made.recording], coverage=Coverage(0.8))
+    assert alone.summary["peak_n"]["left"]["mean"] > 1.2 * true_n
+    assert not any("±" in name for name, _ in by_foot(alone))
+    (flag,) = [one for one in alone.to_dict()["flags"] if one["kind"] == "peaks_by_share"]
+    assert "up to 25 % too high" in flag["says"]
+    assert "--coverage-course" in flag["says"]
+    page = write_gait_page(tmp_path / "gait.html", alone, "walk", {}).read_text(encoding="utf-8")
+    assert "up to 25 % too high" in page
+    by_course = analyse([made.recording], coverage=Coverage.midfoot(0.8))
+    assert all(one.kind != "peaks_by_share" for one in by_course.flags)
+    assert all("±" in cell for cell in dict(by_foot(by_course))["mean peak ± 95 % (N)"])
+
+
+def _stances(force_n: np.ndarray) -> list[np.ndarray]:
+    """The stretches of a foot's force in which it is down, without those cut off by the record's ends."""
+    down = np.flatnonzero(np.diff((force_n > 20.0).astype(int)))
+    return [part for part in np.split(force_n, down + 1)[1:-1] if part.max() > 20.0]
 
 
 def test_each_insole_has_its_path(page: Path) -> None:

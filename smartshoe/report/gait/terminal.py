@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from smartshoe.gait import GaitFindings
-from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
 from smartshoe.signals.noise import NORMAL_95
@@ -31,13 +28,19 @@ def weight_mark(found: GaitFindings) -> str:
 
 
 def _peaks(found: GaitFindings, foot: str) -> str:
-    """The mean peak with its 95 % interval, from the spread over strides and the estimate's own error."""
-    own = [stride.peak_n for stride in main_strides(found, foot) if stride.peak_n is not None]
-    if len(own) < 2:
+    """The mean peak with its 95 % interval, from the spread over strides and the estimate's own error.
+
+    Like the peak force, it is of all strides that the summary counts: a stream lists only the first of them. The dash
+    for a coverage that does not say when in a stance it holds: what peaks are then off by is neither of the two.
+    """
+    if any(flag.kind == "peaks_by_share" for flag in found.flags):
         return "–"
-    own_sd = float(np.std(own, ddof=1)) / math.sqrt(len(own))
+    peak, count = found.figures["peak_n"].get(foot), found.figures["strides"].get(foot, 0)
+    if not peak or peak["mean"] is None or peak["cv_percent"] is None:
+        return "–"
+    own_sd = 0.01 * peak["cv_percent"] * peak["mean"] / math.sqrt(count)
     sd = math.hypot(own_sd, found.forces.rmse_estimate_n or 0.0)
-    return f"{plain(float(np.mean(own)))} ± {plain(NORMAL_95 * sd, 2)}"
+    return f"{plain(peak['mean'])} ± {plain(NORMAL_95 * sd, 2)}"
 
 
 def _cv(spread: dict[str, Any] | None) -> str:
