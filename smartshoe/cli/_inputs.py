@@ -89,7 +89,8 @@ def say_what_strikes(recordings: Sequence[Recording]) -> None:
         for channel in recording.loads_and_sensors:
             share = 0.0 if channel.missing is None else float(channel.missing.mean())
             if share > MISSING_SHARE:
-                warn(f"{recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}: they are left out")
+                lacks = f"{recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}"
+                warn(f"{lacks}: in fits they do not count")
             if channel.role == "load" and is_negative(channel):
                 low, high = channel.values.min(), channel.values.max()
                 warn(

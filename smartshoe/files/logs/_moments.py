@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Index
 from smartshoe.errors import FormatError
 from smartshoe.files.logs._numbers import is_missing
 
@@ -18,9 +18,30 @@ _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d{1,9})?)?\s?(Z|[+-
 _OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d([.,]\d{1,9})?", re.ASCII)
 
 
+LONGEST_BREAK_S = 3600.0  # between two rows around midnight
+DAY_S = 86400.0
+
+
 def is_moment(cell: str) -> bool:
     """Whether a cell is a date with a time, or a time of day."""
     return bool(_DATE.fullmatch(cell) or _OF_DAY.fullmatch(cell))
+
+
+def is_of_day(cell: str) -> bool:
+    """Whether a cell is a time of day without a date."""
+    return bool(_OF_DAY.fullmatch(cell))
+
+
+def midnights(of_day_s: Array) -> Index:
+    """The rows (m,) from which times of day (n,) in s, NaN where missing, are the next day's.
+
+    A step back by a day, less an hour at most, is midnight. None is found if any step is as far forward: then a single
+    row is off, or the clock was set.
+    """
+    rows = np.flatnonzero(np.isfinite(of_day_s))
+    step = np.diff(of_day_s[rows])
+    far = DAY_S - LONGEST_BREAK_S
+    return rows[1:][step < -far] if not (step > far).any() else rows[:0]
 
 
 def seconds_of(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array:

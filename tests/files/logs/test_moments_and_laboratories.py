@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import smartshoe
+from smartshoe.calibration import Calibration
 from smartshoe.cli import run_command
-from smartshoe.errors import FormatError, MissingChannelError
-from smartshoe.files.logs._moments import is_moment, seconds_of
+from smartshoe.errors import FormatError, InputError, MissingChannelError
+from smartshoe.files.logs._moments import is_moment, midnights, seconds_of
+from smartshoe.units import MILLIBAR
 
 
 def table(path: Path, header: str, rows: list[str]) -> Path:
@@ -50,6 +52,43 @@ def test_a_column_of_dates_is_the_time(tmp_path: Path, cells: list[str], header:
     assert cells[0] in found.metadata.values()
 
 
+@given(st.integers(0, 86399), st.lists(st.integers(1, 1_700_000), min_size=1, max_size=120), st.data())
+def test_times_of_day_go_on_past_every_midnight(first_s: int, steps_ms: list[int], data: st.DataObject) -> None:
+    """Whatever lies between two rows, up to nearly an hour, and whichever cells are empty."""
+    since_ms = np.cumsum([0, *steps_ms])
+    of_day_s = ((1000 * first_s + since_ms) % 86_400_000 - 1000 * first_s) / 1e3
+    odd = data.draw(st.sets(st.integers(0, since_ms.size // 2 - 1)))
+    of_day_s[[2 * k + 1 for k in odd]] = np.nan
+    for row in midnights(of_day_s):
+        of_day_s[row:] += 86_400.0
+    there = np.isfinite(of_day_s)
+    np.testing.assert_allclose(of_day_s[there], since_ms[there] / 1e3, atol=1e-6)
+
+
+def _of_day(tmp_path: Path, *cells: str) -> Path:
+    return table(tmp_path / "night.csv", "Time,Load (N),P (mbar)", [f"{c},{k}.5,{k}.25" for k, c in enumerate(cells)])
+
+
+def test_midnight_is_noted_with_its_line(tmp_path: Path) -> None:
+    found = smartshoe.read(_of_day(tmp_path, "23:59:59.980", "23:59:59.990", "00:00:00.000", "00:00:00.010"))
+    np.testing.assert_allclose(found.time_s, [0.0, 0.01, 0.02, 0.03], atol=1e-9)
+    assert "Column Time passes midnight at line 4: what follows is the next day." in found.notes
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["23:59:58", "23:59:59", "22:00:00", "22:00:01"],  # set back by two hours
+        ["23:59:57", "23:59:58", "00:00:00", "23:59:59"],  # one row is off
+        ["12:00:00", "12:00:01", "12:00:00", "12:00:02"],
+        ["2026-05-02 23:59:58", "2026-05-02 23:59:59", "2026-05-02 00:00:00", "2026-05-02 00:00:01"],  # has a date
+    ],
+)
+def test_a_clock_that_really_goes_back_is_an_error(tmp_path: Path, cells: list[str]) -> None:
+    with pytest.raises(InputError, match="time goes back"):
+        smartshoe.read(_of_day(tmp_path, *cells))
+
+
 def test_a_cell_of_another_kind_among_dates_is_told_with_its_line(tmp_path: Path) -> None:
     rows = [f"2026-05-01T10:00:0{k},{k},{k}" for k in range(4)]
     rows[2] = "2026-05-01T10:00:02Z,2,2"
@@ -85,6 +124,20 @@ def test_many_missing_samples_are_said(tmp_path: Path, capsys: pytest.CaptureFix
     path = table(tmp_path / "holes.csv", "time_s,force_n,pressure_mbar", rows)
     assert run_command(["convert", str(path), str(tmp_path / "out.csv")]) == 0
     assert "lacks 67 % of the samples of pressure" in capsys.readouterr().err
+
+
+def test_what_is_said_of_missing_readings_holds_for_compensate_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """There they are held at the last value; from fits they are left out."""
+    rows = [f"{0.01 * k:.2f},{5.0 * k},{'' if k % 3 else 0.5 * k}" for k in range(30)]
+    path = table(tmp_path / "holes.csv", "time_s,force_n,pressure_mbar", rows)
+    Calibration(0.215, 1.593, 0.3249, MILLIBAR).save(tmp_path / "c.json")
+    assert run_command(["compensate", str(path), "--calibration", str(tmp_path / "c.json")]) == 0
+    said = capsys.readouterr().err
+    assert "lacks 67 % of the samples of pressure: in fits they do not count" in said
+    assert "20 missing readings of pressure were held at the last value" in said
+    assert "left out" not in said
 
 
 def test_convert_writes_the_contract_s_columns_and_keeps_every_line_above(tmp_path: Path) -> None:
