@@ -71,6 +71,7 @@ def list_command(unit: str | None, date: str | None, store_folder: str | None, j
     """Units, their calibrations, where they sit, what has expired."""
     from smartshoe.calibration.store.dates import days_between, iso, moment
     from smartshoe.cli._output import emit_json, require_writable
+    from smartshoe.display import counted
     from smartshoe.report.tables import new_console, table_of
 
     require_writable(json_path=json_path)
@@ -86,7 +87,7 @@ def list_command(unit: str | None, date: str | None, store_folder: str | None, j
         click.echo(f"{store} holds no calibration yet: smartshoe calibrations add FILE --serial-number S")
         return
     table = table_of(
-        f"{store}: {len(entries)} calibrations of {len(places)} units, as of {iso(at)}",
+        f"{store}: {counted(len(entries), 'calibration')} of {counted(len(places), 'unit')}, as of {iso(at)}",
         ["unit", "sits at", "date", "age (days)", "calibrated at", "holds until", "name or note"],
     )
     for serial, place in places.items():

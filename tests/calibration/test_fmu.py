@@ -136,6 +136,18 @@ def test_a_twin_with_more_than_the_network_is_refused_by_name() -> None:
         export_twins([bent])
 
 
+def test_several_effects_that_no_twin_has_are_told_in_the_plural() -> None:
+    bent = PLAY.model()
+    for name, values in (("play_hysteresis", [0.02]), ("orifice_leak", [0.001, 0.01])):
+        with pytest.raises(UsageError, match=f"{name}, which is not written"):
+            export_twins([extended_calibration(PLAY.model().with_part(effect(name), np.array(values)))])
+        bent = bent.with_part(effect(name), np.array(values))
+    with pytest.raises(
+        UsageError, match="has play_hysteresis, orifice_leak, which are not written forward in C: simul"
+    ):
+        export_twins([extended_calibration(bent)])
+
+
 @pytest.mark.parametrize("make", [lambda: export_shoe([TOE, PLAY], "fmu"), lambda: export_twins([TOE, PLAY])])
 def test_its_sources_compile_without_a_warning_and_hold_no_path(make: Any, tmp_path: Path) -> None:
     files = make()

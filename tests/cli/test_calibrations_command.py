@@ -37,8 +37,9 @@ def run(capsys: pytest.CaptureFixture[str], *words: str, status: int = 0) -> str
 
 def test_a_units_life_from_add_to_drift(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "holds no calibration yet" in run(capsys, "list")
-    for k in range(3):
+    for k, counted in enumerate(("1 calibration of 1 unit,", "2 calibrations of 1 unit,", "3 calibrations of 1 unit,")):
         run(capsys, "add", f"toe{k}.json", "--serial-number", "S1", "--valid-for-days", "20")
+        assert counted in run(capsys, "list")
     run(capsys, "repair", "S1", "--date", "2026-02-15", "--note", "new tube")
     run(capsys, "swap", "left_toe", "S1", "--date", "2026-01-01")
     shown = run(capsys, "list", "--date", "2026-02-20")

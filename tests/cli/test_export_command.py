@@ -49,6 +49,8 @@ def test_each_target_writes_its_files_and_lists_them(
         (["--to", "json", "--fixed", "q15"], "q15"),
         (["--to", "c", "--twin"], "--twin"),
         (["--to", "c", "--fixed", "q7"], "q7"),
+        (["--to", "c", "--precision", "q15"], "use double or float, or --fixed q15 for integers"),
+        (["--to", "c", "--precision", "q31"], "use double or float, or --fixed q31 for integers"),
         (["--to", "c", "--name", "left toe"], "left toe"),
     ],
 )

@@ -84,7 +84,8 @@ def export_shoe(
     if to not in _TARGETS:
         raise UsageError(f"target {to!r} is not known: use {', '.join(TARGETS[:-1])} or {TARGETS[-1]}")
     if precision not in get_args(Precision):
-        raise UsageError(f"precision {precision!r} is not known: use {' or '.join(get_args(Precision))}")
+        integers = f", or --fixed {precision} for integers" if precision in get_args(Fixed) else ""
+        raise UsageError(f"precision {precision!r} is not known: use {' or '.join(get_args(Precision))}{integers}")
     if precision == "float" and to != "c":
         raise UsageError(f"precision float is for target c, {to} is always double: leave it away")
     if fixed is not None and fixed not in get_args(Fixed):

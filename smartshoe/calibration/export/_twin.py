@@ -37,8 +37,9 @@ class TwinModel:
         others = [p.name for p in found.chain if p is not None and p.effect.shifts is None and not _is_idle(p)]
         if others:
             raise UsageError(
-                f"the twin of {self.calibration.unit or 'this unit'} has {', '.join(others)}, which is not written"
-                " forward in C: simulate it with bladder = {twin = ...} in a scenario, or export the plain calibration"
+                f"the twin of {self.calibration.unit or 'this unit'} has {', '.join(others)}, which"
+                f" {'is' if len(others) == 1 else 'are'} not written forward in C: simulate it with"
+                " bladder = {twin = ...} in a scenario, or export the plain calibration"
             )
         return found
 
