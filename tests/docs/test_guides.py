@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import smartshoe
 from smartshoe.cli import run_command
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,3 +45,20 @@ def test_the_guides_blocks_run(guide: str, recordings: Path, tmp_path: Path, mon
             words = shlex.split(line)
             if words[0] == "smartshoe":
                 assert run_command(words[1:]) == 0, line
+
+
+@pytest.mark.parametrize("header", ["time_s,force_n,pressure_mbar", "Time (s);Load (N);P (mbar)"])
+def test_the_effective_area_is_declared_as_the_guide_shows(header: str, tmp_path: Path) -> None:
+    """In a plain table and in another's CSV."""
+    guide = (ROOT / "docs" / "identification.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```text\n(# effective_area_m2.*?)```", guide, re.DOTALL)
+    above, ours, *rows = shown.splitlines()
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "\n".join([above, header, *(row.replace(",", ";" if ";" in header else ",") for row in rows)]) + "\n",
+        encoding="utf-8",
+    )
+    assert ours == "time_s,force_n,pressure_mbar"
+    found = smartshoe.read(path)
+    assert found.positive("effective_area_m2", "m2") == 0.004
+    assert found.force_n.tolist() == [0.6, 0.9]
