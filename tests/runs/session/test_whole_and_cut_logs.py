@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import Recording
-from smartshoe.runs.session._checks import PressingFault, Pressing, too_few_repeats
+from smartshoe.runs.session._checks import Pressing, PressingFault, too_few_repeats
 
 PEAK_N = 800.0
 PROTOCOLS = {
