@@ -44,7 +44,7 @@ def twins_by_noise(recordings: Sequence[Recording], thresholds: Thresholds) -> d
     seen: dict[int, _Signals] = {}
     found = {}
     for place, recording in enumerate(recordings):
-        if not recording.of_role("load"):
+        if len(recording.of_role("load")) != 1 or len(recording.sensors) != 1:
             continue
         one = _signals_of(recording)
         if one.time_s.size < thresholds.least_samples:

@@ -75,6 +75,14 @@ def test_one_reading_beside_another_load_column_is_one_experiment() -> None:
     assert twins_by_noise((one, one.with_channel(replace(one["force"], values=800.0 - LOAD_N))), STANDARD) == {}
 
 
+def test_recordings_without_one_load_and_one_reading_are_refused_for_that() -> None:
+    one = _run("one")
+    two = one.with_channel(replace(one.sensor, name="second", values=2.0 * one.sensor.values))
+    for other in (one.without("force"), one.without("pressure"), two):
+        assert twins_by_noise((other, one, other), STANDARD) == {}
+        assert diagnose(other).verdict == "refused"
+
+
 def test_a_diagnosis_does_not_judge_on_a_rounded_copy() -> None:
     found = diagnose(_run("one"), hold_out=_written(digits=2))
     assert found.left_out == (

@@ -117,14 +117,14 @@ def test_a_minute_is_timed_within_a_millisecond(law: str) -> None:
 def test_the_standard_error_of_the_skew_is_the_size_of_its_errors(law: str) -> None:
     true_s = np.arange(60 * RATE_HZ) / RATE_HZ
     errors = []
-    for seed in range(40):
+    for seed in range(20):
         clock = DeviceClock()
         arrival_s = np.maximum.accumulate(true_s + _delays(law, true_s, np.random.default_rng(seed)))
         clock.update(true_s / (1.0 + SKEW_PPM * 1e-6), arrival_s)
         assert clock.fit is not None
         errors.append((clock.fit.skew_ppm - SKEW_PPM) / clock.fit.skew_sd_ppm)
-    # The root mean square of forty is known to a ninth.
-    assert 0.66 < np.sqrt(np.mean(np.square(errors))) < 1.33
+    # The root mean square of twenty is known to a sixth.
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5
 
 
 @settings(max_examples=8)
