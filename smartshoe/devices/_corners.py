@@ -6,16 +6,34 @@ dampers, leaks and friction all respond smoothly between corners. Around each co
     r = cubic(t) + g F(tau) + a x^2 + b x^3,   x = max(tau - corner, 0),   tau = t + delay + rate (t - middle)
 
 Each corner has its own cubic, gain and curvature after the corner; delay and rate are common to all. This uses only a
-small part of the record, but is unbiased where a fit of the whole record is not.
+small part of the record, but is less biased than a fit of the whole record.
+
+It is not free of bias: what the unit does soon after a corner (play that is passed, heat that leaves) is no cubic, and
+shifts the corner. Repeats do not average that away, and the noise about the fit does not tell it. Two things do, and
+the sds are the largest of what the three say:
+
+1. The shift is the same wherever the load turns in the same way, and another where it turns otherwise: the start of a
+   quick rise comes late, the end of a fall does not. How far kinds of corners disagree is the covariance of clustered
+   least squares with each kind as one cluster (Liang and Zeger 1986, Biometrika 73, 13-22), times Student's quantile
+   over the normal one, for there are few kinds:
+
+       cov = N^-1 (sum over the G kinds of m m') N^-1 G/(G - 1),
+
+   N the normal matrix and m the kind's part of the gradient.
+2. The shift changes with how far the corner is looked at, for the cubics follow anything smooth over a short enough
+   time: a second search looks half as far. This tells where kinds are mirror images, as in triangles without a rest.
+
+Neither sees what shifts a corner within milliseconds, such as a lag of the sensor itself.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Index
+from smartshoe.signals.noise import NORMAL_95
 
 SLOPE_OVER_S = 0.15
 APART_S = 0.3
@@ -27,6 +45,8 @@ LEAST_SAMPLES = 30
 ITERATIONS = 10
 SETTLED = 1e-2
 DEPENDENT = 1e-9
+NEAR = 0.5  # of how far a corner is looked at, in the second search: the part of the delay that hangs on it shows
+ALIKE = 0.25  # of the larger slope beside a corner: corners whose slopes differ by less are one kind
 
 
 def slope_of(time_s: Array, load: Array, over_s: float = SLOPE_OVER_S) -> Array:
@@ -59,12 +79,16 @@ def corners(time_s: Array, load: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class AtCorners:
-    """Delay in s and clock rate from a load's corners, with their sds."""
+    """Delay in s and clock rate from a load's corners, with their sds.
+
+    ``noise_sd_s`` is the part of the delay's sd that the noise about the fit makes.
+    """
 
     delay_s: float
     delay_sd_s: float
     rate: float
     rate_sd: float
+    noise_sd_s: float
 
 
 def follow_corners(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> AtCorners | None:
@@ -75,26 +99,80 @@ def follow_corners(machine_s: Array, load: Array, logger_s: Array, signal: Array
     load's noise hold a search wherever it begins.
     """
     aside = 0.5 * SLOPE_OVER_S
-    first, second = (_searched_from(machine_s, load, logger_s, signal, delay_s + way * aside) for way in (-1.0, 1.0))
-    if first is None or second is None:
+    logs = machine_s, load, logger_s, signal
+    found, second = (_searched_from(*logs, delay_s + way * aside) for way in (-1.0, 1.0))
+    if found is None or second is None:
         return None
-    return first if abs(first.delay_s - second.delay_s) <= max(first.delay_sd_s, second.delay_sd_s) else None
+    if abs(found.delay_s - second.delay_s) > max(found.noise_sd_s, second.noise_sd_s):
+        return None
+    near = _searched_from(*logs, found.delay_s, NEAR)
+    if near is None:
+        return found
+    return replace(
+        found,
+        delay_sd_s=max(found.delay_sd_s, abs(near.delay_s - found.delay_s)),
+        rate_sd=max(found.rate_sd, abs(near.rate - found.rate)),
+    )
 
 
-def _searched_from(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> AtCorners | None:
-    """Where a search from ``delay_s`` ends; None where fewer than two corners can be used."""
+def kinds_of(at_corners: Array, sides: Array, machine_s: Array, load: Array) -> Index:
+    """The kind (m,) of each corner, a number from 0: corners of one kind have like slopes before and after them.
+
+    ``sides`` (m, 2) is how far in s a corner is looked at, before and after it.
+    """
+    level = np.interp(at_corners, machine_s, load)
+    before = (level - np.interp(at_corners - sides[:, 0], machine_s, load)) / sides[:, 0]
+    after = (np.interp(at_corners + sides[:, 1], machine_s, load) - level) / sides[:, 1]
+    slopes = np.column_stack([before, after])
+    kinds = np.full(at_corners.size, -1)
+    while (left := np.flatnonzero(kinds < 0)).size:
+        first = slopes[left[0]]
+        alike = np.abs(slopes[left] - first).max(axis=1) <= ALIKE * np.abs(first).max()
+        kinds[left[alike]] = kinds.max() + 1
+    return kinds
+
+
+def _sd_of_kinds(normal: Array, moments: Array, kinds: Index) -> Array:
+    """The sds (2,) of delay and rate by how far kinds of corners disagree; zeros where there is one kind only.
+
+    ``normal`` (2, 2) is the normal matrix, ``moments`` (k, 2) the corners' parts of the gradient where the search
+    ended, ``kinds`` (k,) theirs.
+    """
+    from scipy.special import stdtrit
+
+    count = np.unique(kinds).size
+    if count < 2:
+        return np.zeros(2)
+    of_kinds = np.array([moments[kinds == kind].sum(axis=0) for kind in np.unique(kinds)])
+    size = np.sqrt(np.diag(normal))
+    moved = of_kinds / size @ np.linalg.pinv(normal / np.outer(size, size)) / size
+    few = float(stdtrit(count - 1, 0.975)) / NORMAL_95
+    found: Array = few * np.sqrt((moved**2).sum(axis=0) * count / (count - 1))
+    return found
+
+
+def _searched_from(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float, far: float = 1.0
+) -> AtCorners | None:
+    """Where a search from ``delay_s`` ends; None where fewer than two corners can be used.
+
+    ``far`` is the share of the usual time before and after each corner that is looked at.
+    """
     at_corners = corners(machine_s, load)
     gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))
-    sides = np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
+    sides = far * np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
     middle = 0.5 * (logger_s[0] + logger_s[-1])
     slope = slope_of(machine_s, load, 0.05)
-    delay, rate, sd = delay_s, 0.0, np.zeros(2)
+    kinds = kinds_of(at_corners, sides, machine_s, load)
+    delay, rate, sd, of_kinds = delay_s, 0.0, np.zeros(2), np.zeros(2)
     for _ in range(ITERATIONS):
         at = logger_s + delay + rate * (logger_s - middle)
-        normal, moment, scatter, freedom, used = np.zeros((2, 2)), np.zeros(2), 0.0, 0, 0
-        for corner, (before, after) in zip(at_corners, sides, strict=True):
+        normal, scatter, freedom = np.zeros((2, 2)), 0.0, 0
+        moments: list[Array] = []
+        used: list[int] = []
+        for corner, (before, after), kind in zip(at_corners, sides, kinds, strict=True):
             first, last = np.searchsorted(at, [corner - before, corner + after])
-            if last - first < LEAST_SAMPLES or min(before, after) < SHORTEST_SIDE_S:
+            if last - first < far * LEAST_SAMPLES or min(before, after) < far * SHORTEST_SIDE_S:
                 continue
             tau = at[first:last]
             place = (tau - corner) / max(before, after)
@@ -111,17 +189,19 @@ def _searched_from(machine_s: Array, load: Array, logger_s: Array, signal: Array
             tilts -= basis @ (basis.T @ tilts)
             left = values - basis @ (basis.T @ values)
             normal += tilts.T @ tilts
-            moment += tilts.T @ left
+            moments.append(tilts.T @ left)
             scatter += float(left @ left)
             freedom += left.size - local.shape[1]
-            used += 1
-        if used < 2:
+            used.append(int(kind))
+        if len(used) < 2:
             return None
         size = np.sqrt(np.diag(normal))
         scaled = normal / np.outer(size, size)
-        change = np.linalg.lstsq(scaled, moment / size, rcond=None)[0] / size
+        change = np.linalg.lstsq(scaled, np.sum(moments, axis=0) / size, rcond=None)[0] / size
         sd = np.sqrt(np.diag(np.linalg.pinv(scaled)) * scatter / freedom) / size
         delay, rate = delay + float(change[0]), rate + float(change[1])
+        of_kinds = _sd_of_kinds(normal, np.array(moments), np.array(used))
         if np.all(np.abs(change) <= SETTLED * sd):
             break
-    return AtCorners(delay, float(sd[0]), rate, float(sd[1]))
+    delay_sd_s, rate_sd = np.maximum(sd, of_kinds)
+    return AtCorners(delay, float(delay_sd_s), rate, float(rate_sd), float(sd[0]))

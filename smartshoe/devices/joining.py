@@ -33,9 +33,12 @@ By = Literal["load", "model", "corners", "curve"]
 CAVEATS: dict[By, str] = {
     "load": "",
     "model": ", the unit's own lag was estimated too",
-    "corners": ", and the unit does more than its model says, so the load's corners alone were used",
+    "corners": (
+        ", and the unit does more than its model says, so the load's corners alone were used: the error counts how far"
+        " they disagree"
+    ),
     "curve": (
-        ", and the unit does more than its model says, but the load has no corners: the unit's lag and curve were"
+        ", and the unit does more than its model says, but the load has no corners that lead to one delay: the unit's lag and curve were"
         " estimated too, and the error counts what the curve changes"
     ),
 }
@@ -60,9 +63,13 @@ class Alignment:
 
     @property
     def says(self) -> str:
-        """The offset and rate of the machine's clock against the logger's, in words; negative is behind and slow."""
+        """The offset and rate of the machine's clock against the logger's, in words; negative is behind and slow.
+
+        The offset is the one in the middle of the logger's record; where the rates differ, it is another elsewhere.
+        """
         return (
-            f"{abs(self.delay_s):.4f} ± {self.delay_sd_s:.4f} s {'behind' if self.delay_s < 0 else 'ahead'},"
+            f"{abs(self.delay_s):.4f} ± {self.delay_sd_s:.4f} s {'behind' if self.delay_s < 0 else 'ahead'}"
+            " in the middle of the record,"
             f" {1e6 * abs(self.rate):.1f} ± {1e6 * self.rate_sd:.1f} ppm {'slow' if self.rate < 0 else 'fast'}"
         )
 

@@ -132,8 +132,8 @@ def test_two_logs_that_one_clock_may_have_written_say_so(rate: float, later_s: f
 
 @pytest.mark.parametrize(
     ("delay_s", "rate", "words"),
-    [(0.35, 2e-4, "0.3500 ± 0.0010 s ahead, 200.0 ± 3.0 ppm fast"),
-     (-5.3, -1e-4, "5.3000 ± 0.0010 s behind, 100.0 ± 3.0 ppm slow")],
+    [(0.35, 2e-4, "0.3500 ± 0.0010 s ahead in the middle of the record, 200.0 ± 3.0 ppm fast"),
+     (-5.3, -1e-4, "5.3000 ± 0.0010 s behind in the middle of the record, 100.0 ± 3.0 ppm slow")],
 )  # fmt: skip
 def test_a_clock_that_is_behind_is_not_said_to_be_ahead_by_less_than_nothing(
     delay_s: float, rate: float, words: str

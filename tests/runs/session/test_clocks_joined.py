@@ -15,9 +15,10 @@ import pytest
 from scipy.signal import lfilter
 
 from smartshoe.devices import open_machine, open_shoe
-from smartshoe.devices._corners import corners, follow_corners
-from smartshoe.devices.joining import align_reading, coarse
+from smartshoe.devices._corners import corners, follow_corners, kinds_of
+from smartshoe.devices.joining import Alignment, align_reading, coarse
 from smartshoe.protocol import Protocol, dynamic_protocol
+from smartshoe.signals.noise import NORMAL_95
 
 SENSOR_LAG_S = 0.001
 HYSTERESIS = {"bladder": {"hysteresis": {"strength": 0.01}}}
@@ -121,6 +122,80 @@ def test_kinks_of_a_smooth_loads_noise_are_no_corners(seed: int) -> None:
     assert abs(found.delay_s + late_s) < 3.0 * found.delay_sd_s + 0.02
     # What the corners would have said, from where the correlation is best:
     assert follow_corners(machine_s, gauged, shoe_s, reading, coarse(machine_s, gauged, shoe_s, reading)[0]) is None
+
+
+def _bent_unit(load_n: np.ndarray, *, leak_per_s: float, play: float, bend: float) -> np.ndarray:
+    """Reading (n,) under a load at 100 Hz: a bend, play of a twentieth of 800 N each way, relaxation, an air leak."""
+    share = load_n / 800.0
+    centre, lagging, leaked = 0.0, 0.0, 0.0
+    reading = np.empty(load_n.size)
+    for k, pressed in enumerate(share):
+        centre = min(max(centre, pressed - 0.05), pressed + 0.05)
+        level = pressed - play * (pressed - centre) / 0.05
+        level += 4.0 * bend * level * (1.0 - level)
+        lagging += 0.01 * (level - lagging) / 4.0
+        leaked += 0.01 * leak_per_s * (level - leaked)
+        reading[k] = level + 0.08 * lagging - leaked
+    return 160.0 * reading
+
+
+def _joined_bent(rates_n_per_s: tuple[float, ...], rest_s: float, seed: int, **unit: float) -> tuple[Alignment, float]:
+    """The alignment of a load's log and a unit's at 50 Hz that runs 100 ppm fast, and how far off its delay is in s."""
+    rng = np.random.default_rng(seed)
+    parts = [np.zeros(300)]
+    for rate in rates_n_per_s:
+        samples = round(100.0 * 800.0 / rate)
+        up = np.linspace(0.0, 800.0, samples, endpoint=False)
+        parts += [up, 800.0 - up, np.zeros(round(100.0 * rest_s))]
+    load_n = np.concatenate([*parts, np.zeros(300)])
+    machine_s = 0.01 * np.arange(load_n.size)
+    reading = _bent_unit(load_n, **unit) + rng.normal(0.0, 0.05, load_n.size)
+    true_s = np.arange(-4.0, machine_s[-1] + 5.0, 0.02)
+    logger_s = 1.0001 * (true_s + 4.0)
+    found = align_reading(
+        machine_s, load_n + rng.normal(0.0, 0.3, load_n.size), logger_s, np.interp(true_s, machine_s, reading)
+    )
+    middle_s = 0.5 * (logger_s[0] + logger_s[-1])
+    return found, found.delay_s - (middle_s / 1.0001 - 4.0 - middle_s)
+
+
+@pytest.mark.parametrize(
+    ("rates_n_per_s", "rest_s"),
+    [
+        ((100.0, 100.0, 200.0, 200.0, 400.0, 400.0, 800.0, 800.0), 1.0),
+        ((800.0,) * 12, 1.0),
+        ((400.0,) * 12, 0.0),  # two kinds of corners, each the other's mirror image: they are shifted alike
+    ],
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_error_bar_of_corners_holds_what_friction_and_a_leak_shift_them(
+    rates_n_per_s: tuple[float, ...], rest_s: float, seed: int
+) -> None:
+    found, wrong_s = _joined_bent(rates_n_per_s, rest_s, seed, leak_per_s=0.006, play=0.015, bend=0.03)
+    assert found.by == "corners"
+    # 4 to 13 ms, where the noise about the fit alone says 0.3 to 1 ms.
+    assert 3e-3 < abs(wrong_s) < NORMAL_95 * found.delay_sd_s
+    assert found.delay_sd_s < 0.02
+
+
+def test_a_leak_alone_costs_the_corners_no_error_bar() -> None:
+    """It has no quick part: corners of all kinds agree within the noise."""
+    found, wrong_s = _joined_bent((100.0, 200.0, 400.0, 800.0), 1.0, 3, leak_per_s=0.05, play=0.0, bend=0.03)
+    assert found.by == "corners"
+    assert abs(wrong_s) < 3.0 * found.delay_sd_s
+    assert found.delay_sd_s < 1.5e-3
+
+
+def test_kinds_of_corners_are_told_by_the_slopes_beside_them() -> None:
+    protocol = dynamic_protocol((100.0, 400.0), rest_s=2.0)
+    time_s = np.arange(0.0, protocol.duration_s, 0.01)
+    load_n = protocol.load_at(time_s)
+    at = corners(time_s, load_n)
+    kinds = kinds_of(at, np.full((at.size, 2), 0.2), time_s, load_n)
+    slopes = np.round((np.interp(at + 0.2, time_s, load_n) - np.interp(at, time_s, load_n)) / 20.0)
+    for kind in range(kinds.max() + 1):
+        assert np.ptp(slopes[kinds == kind]) <= 0.25 * np.abs(slopes[kinds == kind]).max()
+    assert kinds.max() + 1 == 6  # two rates: a rise begins, turns into a fall, and the fall ends
 
 
 @pytest.mark.bank
