@@ -170,7 +170,10 @@ def limit_force(found: Compensation) -> list[str]:
 def limit_not_undone(model: ExtendedModel, step_s: float) -> list[str]:
     """Sentences on effects that no compensator can remove from a stream of readings."""
     passed_over = ExtendedCompensator(model, 1.0 / step_s).not_inverted
-    return [f"no compensator can correct the {name.replace('_', ' ')}: {why}" for name, why in passed_over.items()]
+    return [
+        f"no compensator can correct the {in_words(name)} in the extended model: {why}"
+        for name, why in passed_over.items()
+    ]
 
 
 def limit_latency_left(found: Compensation) -> list[str]:

@@ -169,10 +169,10 @@ def test_a_force_that_is_hardly_worse_decides_nothing(
 def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
     (said,) = limit_not_undone(late, 0.02)
-    late_by = "no compensator can correct the delay: a stream of readings cannot be moved to another time"
+    late_by = "no compensator can correct the delay in the extended model: a stream of readings cannot be moved to"
     assert said.startswith(late_by)
     (said,) = limit_not_undone(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
-    assert said.startswith("no compensator can correct the clock drift: ")
+    assert said.startswith("no compensator can correct the clock drift in the extended model: ")
     assert limit_not_undone(late.without("delay"), 0.02) == []
 
 
