@@ -38,8 +38,8 @@ CAVEATS: dict[By, str] = {
         " they disagree"
     ),
     "curve": (
-        ", and the unit does more than its model says, but the load has no corners that lead to one delay: the unit's lag and curve were"
-        " estimated too, and the error counts what the curve changes"
+        ", and the unit does more than its model says, but the load has no corners that lead to one delay: the unit's"
+        " lag and curve were estimated too, and the error counts what the curve changes"
     ),
 }
 
