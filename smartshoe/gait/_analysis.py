@@ -89,7 +89,7 @@ def analyse(
     require_steps(sums, given[0].label)
     forces = sums.forces(body_weight_n)
     flags += window.flags
-    flags += trial_flags(forces, covered, body_weight_n, sums)
+    flags += trial_flags(forces, covered.share, body_weight_n, sums.strides[False], sums.strides[True])
     total = window.total
     return GaitResult(
         activity=sums.activity(),

@@ -18,9 +18,7 @@ from smartshoe.recording import REGIONS
 from smartshoe.signals.masks import runs_of
 
 if TYPE_CHECKING:
-    from smartshoe.gait._coverage import Coverage
     from smartshoe.gait._force_sums import Forces
-    from smartshoe.gait._trial_sums import TrialSums
 
 
 LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # range of body weights
@@ -66,14 +64,9 @@ def window_flags(
     return flags + _rate_flags(feet, series)
 
 
-def trial_flags(forces: Forces, coverage: Coverage, given_n: float | None, sums: TrialSums) -> list[Flag]:
-    """The flags that need the whole trial.
-
-    They are of an implausible body weight, of peaks with a coverage that does not say when in a stance it holds, and of
-    strides of both walking and running.
-    """
-    flags = [*_weight_flags(forces, coverage.share, given_n), *_share_flags(coverage, sums)]
-    walks, runs = sums.strides[False], sums.strides[True]
+def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: int, runs: int) -> list[Flag]:
+    """The flags that need the whole trial: an implausible body weight, and strides of both walking and running."""
+    flags = _weight_flags(forces, coverage, given_n)
     if walks and runs:
         main = "running" if runs > walks else "walking"
         flags.append(
@@ -276,29 +269,6 @@ def _rate_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> l
             "beyond_calibrated_rate",
             f"{len(faster)} units are loaded faster than they were calibrated ({name}: {rate:.0f} N/s, calibrated to"
             f" {limit:.0f} N/s): the filter is extrapolated there",
-        )
-    ]
-
-
-def _share_flags(coverage: Coverage, sums: TrialSums) -> list[Flag]:
-    """A flag if peaks were divided by a share of the impulse, which is not the share at the moment of the peak.
-
-    Divided by the share c, a force that is on the units alone comes out 1/c times as large, and that is what push-off
-    is in walking. No more can be too much, for the units bear no more than the foot does.
-    """
-    peaks = sums.summary()["peak_n"].values()
-    if coverage.knows_when(running=sums.is_running) or all(own["mean"] is None for own in peaks):
-        return []
-    how = "give --coverage-course midfoot, or one learned from plates"
-    if sums.is_running:
-        how = "give --coverage-course with one learned from plates; the midfoot's is of walking"
-    return [
-        Flag(
-            "peaks_by_share",
-            f"a coverage of {coverage.share:.3g} alone says how much of a stance's load is on the units, not when:"
-            " where they bear nearly all of it, as in push-off, peaks come out up to"
-            f" {100.0 * (1.0 / coverage.share - 1.0):.2g} % too high, and loading rates are off too; the mean peak is"
-            f" given without an interval: {how}",
         )
     ]
 

@@ -242,7 +242,7 @@ class _Day:
         require_steps(sums, self.label)
         is_cut = self.stride_count > len(self._listed)
         forces = sums.forces(self.body_weight_n)
-        of_all = trial_flags(forces, self.coverage, self.body_weight_n, sums)
+        of_all = trial_flags(forces, self.coverage.share, self.body_weight_n, sums.strides[False], sums.strides[True])
         return DayResult(
             activity=sums.activity(),
             events=tuple(self._listed_events),

@@ -106,8 +106,7 @@ class TrialSums:
             self.standing_s += max(0.0, min(end_s, window.end_s) - max(start_s, window.start_s))
 
     @property
-    def is_running(self) -> bool:
-        """Whether the main activity, of which the summary is, is running."""
+    def _main(self) -> bool:
         return self._kinds[True].count > self._kinds[False].count
 
     def activity(self) -> Activity:
@@ -119,11 +118,11 @@ class TrialSums:
 
     def summary(self) -> dict[str, Any]:
         """The summary figures of the strides without gaps of the main activity."""
-        return self._kinds[self.is_running].summary()
+        return self._kinds[self._main].summary()
 
     def indices(self) -> dict[str, dict[str, float | None]]:
         """Each foot's indices in percent: sequence errors, deviation from the pattern, abnormality."""
-        return {name: self._regular[self.is_running, name].to_dict() for name in self._feet}
+        return {name: self._regular[self._main, name].to_dict() for name in self._feet}
 
     def forces(self, given_n: float | None) -> Forces:
         """Body weight and total forces; ``given_n`` is the body weight if it was given."""

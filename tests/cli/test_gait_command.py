@@ -109,7 +109,7 @@ def test_readings_with_calibrations_from_two_files(tmp_path: Path, capsys: pytes
                 calibrations += ["--calibration", str(path)]
     found = _json(capsys, *files, *calibrations, "--coverage", "0.8", "--body-weight", "519.4")
     _check_contract(found)
-    assert [flag["kind"] for flag in found["flags"]] == ["peaks_by_share"]
+    assert found["flags"] == []
     assert found["forces"]["body_weight_n"] == {"value": 519.4, "sd": 0.0}
     assert found["forces"]["mean_total_n"] == pytest.approx(519.4, rel=0.02)
     # Without calibrations what can be told is told.

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from trials import analysed, loads_of, ran, recorded, stood, times_of, walked
+from trials import analysed, loads_of, ran, recorded, times_of, walked
 
 from simulators.people import Person, Stand, trial
 from smartshoe.calibration import Calibration
 from smartshoe.errors import InputError, MissingChannelError, RefusedError, UnitError, UsageError
-from smartshoe.gait import Coverage, GaitResult, analyse
+from smartshoe.gait import GaitResult, analyse
 from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
@@ -35,31 +35,13 @@ def _exchanged(columns: Columns, *pairs: tuple[str, str]) -> Columns:
 
 
 def test_a_good_trial_has_no_flags() -> None:
-    assert analyse(walked().recording, coverage=Coverage.midfoot(0.8)).flags == ()
+    assert analysed().flags == ()
     assert _kinds(analyse(ran().recording)) == set()
-
-
-def test_a_share_alone_is_told_where_peaks_depend_on_it() -> None:
-    """A fifth of the impulse beside the units, at an unknown moment, makes peaks a quarter too high at most."""
-    (flag,) = analysed().flags
-    assert flag.kind == "peaks_by_share"
-    assert "up to 25 % too high" in flag.says
-    assert "--coverage-course midfoot" in flag.says
-    # Of a runner the midfoot's course says nothing, and one that was learned says all.
-    (flag,) = analyse(ran().recording, coverage=Coverage.midfoot(0.8)).flags
-    assert flag.kind == "peaks_by_share"
-    assert "the midfoot's is of walking" in flag.says
-    learned = Coverage(0.8, Coverage.midfoot(0.8).course)
-    assert "peaks_by_share" not in _kinds(analyse(ran().recording, coverage=learned))
-    # Neither a standing person nor readings without a unit of force have peaks.
-    assert "peaks_by_share" not in _kinds(analyse(stood().recording, coverage=0.8))
-    readings = {name.replace("_n", "_mbar"): 0.2 * values for name, values in loads_of(walked()).items()}
-    assert "peaks_by_share" not in _kinds(analyse(recorded(walked().time_s, readings), coverage=0.8))
 
 
 def test_one_shoe_tells_its_own_numbers() -> None:
     found = analyse(recorded(walked().time_s, _of("left", loads_of(walked()))), coverage=0.8)
-    assert _kinds(found) == {"one_shoe", "peaks_by_share"}
+    assert _kinds(found) == {"one_shoe"}
     assert np.array_equal(times_of(found, "left", "heel_strike"), times_of(analysed(), "left", "heel_strike"))
     assert found.summary["stride_time_s"]["left"] == analysed().summary["stride_time_s"]["left"]
     assert found.summary["double_support_percent"] is None
@@ -83,7 +65,7 @@ def test_two_files_make_one_trial() -> None:
     columns = loads_of(walked())
     parts = [recorded(walked().time_s, _of(side, columns), side) for side in ("right", "left")]
     found = analyse(parts, coverage=0.8)
-    assert _kinds(found) == {"peaks_by_share"}
+    assert found.flags == ()
     assert found.forces.mean_total_n == pytest.approx(analysed().forces.mean_total_n)
     with pytest.raises(UsageError, match="both hold the left shoe"):
         analyse([parts[1], parts[1]])
@@ -185,7 +167,7 @@ def test_loads_in_kilonewton_are_implausible_and_times_stand() -> None:
 
 def test_loads_of_the_wrong_sign_are_turned() -> None:
     found = analyse(recorded(walked().time_s, {name: -v for name, v in loads_of(walked()).items()}), coverage=0.8)
-    assert _kinds(found) == {"negative_load", "peaks_by_share"}
+    assert _kinds(found) == {"negative_load"}
     assert found.forces.mean_total_n == pytest.approx(analysed().forces.mean_total_n)
 
 

@@ -16,7 +16,7 @@ from smartshoe.recording import Recording
 from smartshoe.report.gait._page import verdict, write_gait_page
 from smartshoe.report.gait.charts import left_and_right
 from smartshoe.report.gait.charts import trial as trial_chart
-from smartshoe.report.gait.terminal import by_foot, depends_on_coverage
+from smartshoe.report.gait.terminal import by_foot, coverage_note, depends_on_coverage
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_peaks_are_marked_where_nobody_gave_a_coverage(walk: GaitResult) -> None
     assert depends_on_coverage(walk)
     assert any(name.startswith("peak force*") for name, _ in by_foot(walk))
     made = trial(Person(), Walk(1.3), 12.0, np.random.default_rng(1), sensors=False, noise_n=1.0, name="walk")
-    covered = analyse([made.recording], coverage=Coverage(0.8))
+    covered = analyse([made.recording], coverage=Coverage.midfoot(0.8))
     assert not depends_on_coverage(covered)
     assert all("*" not in name for name, _ in by_foot(covered))
 
@@ -58,13 +58,13 @@ def test_a_share_alone_gives_the_mean_peak_no_interval_that_misses_it(tmp_path: 
     alone = analyse([made.recording], coverage=Coverage(0.8))
     assert alone.summary["peak_n"]["left"]["mean"] > 1.2 * true_n
     assert not any("±" in name for name, _ in by_foot(alone))
-    (flag,) = [one for one in alone.to_dict()["flags"] if one["kind"] == "peaks_by_share"]
-    assert "up to 25 % too high" in flag["says"]
-    assert "--coverage-course" in flag["says"]
+    assert any(name.startswith("peak force*") for name, _ in by_foot(alone))
+    assert "up to 25 % too high" in coverage_note(alone)
+    assert "--coverage-course midfoot" in coverage_note(alone)
     page = write_gait_page(tmp_path / "gait.html", alone, "walk", {}).read_text(encoding="utf-8")
     assert "up to 25 % too high" in page
     by_course = analyse([made.recording], coverage=Coverage.midfoot(0.8))
-    assert all(one.kind != "peaks_by_share" for one in by_course.flags)
+    assert coverage_note(by_course) == ""
     assert all("±" in cell for cell in dict(by_foot(by_course))["mean peak ± 95 % (N)"])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from smartshoe.gait import GaitResult
 from smartshoe.report.document import write_document
 from smartshoe.report.gait import charts, shapes
-from smartshoe.report.gait.terminal import COVERAGE_NOTE, by_foot, depends_on_coverage, weight_mark
+from smartshoe.report.gait.terminal import by_foot, coverage_note, weight_mark
 from smartshoe.report.numbers import plain, with_sd
 
 UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # flags: all numbers are meaningless
@@ -34,7 +34,7 @@ def write_gait_page(path: Path, found: GaitResult, title: str, facts: Mapping[st
             "strides": charts.mean_strides(found),
             "insoles": shapes.insoles(found),
             "trial": charts.trial(found),
-            "coverage_note": COVERAGE_NOTE if depends_on_coverage(found) else "",
+            "coverage_note": coverage_note(found),
             "more": [chart for chart in (both, *charts.units(found), by_stride) if chart is not None],
             "folded": [*charts.phases(found), *charts.memberships(found)],
         },

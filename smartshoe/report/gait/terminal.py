@@ -21,6 +21,35 @@ def depends_on_coverage(found: GaitFindings) -> bool:
     return found.coverage == 1.0 and any(own["mean"] is not None for own in found.figures["peak_n"].values())
 
 
+def depends_on_course(found: GaitFindings) -> bool:
+    """Whether forces on the feet assume one coverage at each moment of a stance, so that peaks are none of the foot's.
+
+    What they are off by is neither the spread of strides nor the estimate's error.
+    """
+    knows_when = found.covering.knows_when(running=found.activity == "running")
+    return not knows_when and any(own["mean"] is not None for own in found.figures["peak_n"].values())
+
+
+def coverage_note(found: GaitFindings) -> str:
+    """What forces on the feet assume of the load beside the units, '' if nothing that moves them much.
+
+    Divided by a share c, a force that is on the units alone, as nearly all is in push-off, comes out 1/c times as
+    large; no more can be too much, for the units bear no more than the foot does.
+    """
+    if depends_on_coverage(found):
+        return COVERAGE_NOTE
+    if not depends_on_course(found):
+        return ""
+    how = "give --coverage-course midfoot, or one learned from plates"
+    if found.activity == "running":
+        how = "give --coverage-course with one learned from plates; the midfoot's is of walking"
+    return (
+        f"* a coverage of {found.coverage:.3g} alone says how much of a stance's load is on the units, not when: peaks"
+        f" are up to {100.0 * (1.0 / found.coverage - 1.0):.2g} % too high, since in push-off the units bear nearly"
+        f" all of it, and loading rates are off too: {how}"
+    )
+
+
 def weight_mark(found: GaitFindings) -> str:
     """A star for a body weight that was estimated from loads without a coverage, otherwise ''."""
     weight = found.forces.body_weight
@@ -31,9 +60,9 @@ def _peaks(found: GaitFindings, foot: str) -> str:
     """The mean peak with its 95 % interval, from the spread over strides and the estimate's own error.
 
     Like the peak force, it is of all strides that the summary counts: a stream lists only the first of them. The dash
-    for a coverage that does not say when in a stance it holds: what peaks are then off by is neither of the two.
+    where peaks are none of the foot's.
     """
-    if any(flag.kind == "peaks_by_share" for flag in found.flags):
+    if depends_on_course(found):
         return "–"
     peak, count = found.figures["peak_n"].get(foot), found.figures["strides"].get(foot, 0)
     if not peak or peak["mean"] is None or peak["cv_percent"] is None:
@@ -55,15 +84,16 @@ def by_foot(found: GaitFindings) -> list[tuple[str, list[str]]]:
     summary = found.figures
     feet = list(found.indices)
     mark = "*" if depends_on_coverage(found) else ""
+    of_moment = "*" if coverage_note(found) else ""
     rows: list[tuple[str, list[str]]] = [
         ("strides", [str(summary["strides"].get(foot, 0)) for foot in feet]),
         ("stride time (s)", [_cv(summary["stride_time_s"].get(foot)) for foot in feet]),
         ("step time to this foot (s)", [_cv(summary["step_time_s"].get(foot)) for foot in feet]),
         ("stance (% of stride)", [plain(summary["stance_percent"].get(foot)) for foot in feet]),
-        (f"peak force{mark} (N)", [_cv(summary["peak_n"].get(foot)) for foot in feet]),
-        (f"mean peak{mark} ± 95 % (N)", [_peaks(found, foot) for foot in feet]),
+        (f"peak force{of_moment} (N)", [_cv(summary["peak_n"].get(foot)) for foot in feet]),
+        (f"mean peak{of_moment} ± 95 % (N)", [_peaks(found, foot) for foot in feet]),
         (f"impulse{mark} (N s)", [_cv(summary["impulse_n_s"].get(foot)) for foot in feet]),
-        (f"loading rate{mark} (N/s)", [_cv(summary["loading_rate_n_per_s"].get(foot)) for foot in feet]),
+        (f"loading rate{of_moment} (N/s)", [_cv(summary["loading_rate_n_per_s"].get(foot)) for foot in feet]),
         ("sequence errors (%)", [plain(found.indices[foot]["sequence_error_percent"], 2) for foot in feet]),
         ("deviation from pattern (%)", [plain(found.indices[foot]["deviation_percent"], 2) for foot in feet]),
         ("abnormality (%)", [plain(found.indices[foot]["abnormality_percent"], 2) for foot in feet]),
@@ -80,8 +110,8 @@ def print_gait(found: GaitFindings, title: str) -> None:
     console = new_console()
     if table.row_count:
         console.print(table)
-        if depends_on_coverage(found):
-            console.print(COVERAGE_NOTE, soft_wrap=True)
+        if note := coverage_note(found):
+            console.print(note, soft_wrap=True)
     else:
         none = ", but no stride is whole enough to count: see below" if found.activity in ("walking", "running") else ""
         console.print(f"{title}: {found.activity}{none}", soft_wrap=True)
