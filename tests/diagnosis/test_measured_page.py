@@ -194,7 +194,9 @@ class TestInsole:
         found = _run(_folder(measured, command), command.replace("calibration_dataset", name))
         note = next(one for one in found["sentences"] if "joined with" in one)
         delay_s, sd_s, way, ppm, ppm_sd, rate = re.findall(
-            r"clock is ([\d.]+) ± ([\d.]+) s (behind|ahead), ([\d.]+) ± ([\d.]+) ppm (slow|fast)", note
+            r"clock is ([\d.]+) ± ([\d.]+) s (behind|ahead) in the middle of the record,"
+            r" ([\d.]+) ± ([\d.]+) ppm (slow|fast)",
+            note,
         )[0]
         told_s, told_sd_s = _numbers(behind)
         told_ppm, told_ppm_sd = _numbers(slow)
