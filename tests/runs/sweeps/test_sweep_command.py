@@ -73,10 +73,16 @@ def test_a_second_run_computes_nothing_and_a_lost_case_is_the_same_again(
         assert {path: path.read_bytes() for path in done.rglob("*") if path.is_file()} == files
 
 
-def test_a_dask_scheduler_with_two_workers_gives_the_same_bytes(done: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_a_dask_scheduler_with_two_workers_gives_the_same_bytes(processes: bool, done: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, worker_dashboard_address=None
+        n_workers=2,
+        threads_per_worker=1,
+        processes=processes,
+        protocol="tcp://",  # within one process too: the address is all that a sweep is given
+        dashboard_address=None,
+        worker_dashboard_address=None,
     ) as cluster:
         result = smartshoe.sweep(done.parent / "small.toml", tmp_path / "out", scheduler=cluster.scheduler_address)
     assert result.computed == 4
