@@ -65,6 +65,8 @@ def test_a_share_alone_gives_the_mean_peak_no_interval_that_misses_it(tmp_path: 
     assert "up to 25 % too high" in page
     by_course = analyse([made.recording], coverage=Coverage.midfoot(0.8))
     assert coverage_note(by_course) == ""
+    assert verdict(alone)[1].endswith("only the peaks ask for care, by the note at the table")
+    assert verdict(by_course)[1].endswith("nothing to be careful with was found")
     assert all("±" in cell for cell in dict(by_foot(by_course))["mean peak ± 95 % (N)"])
 
 

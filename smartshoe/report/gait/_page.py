@@ -55,7 +55,8 @@ def verdict(found: GaitResult) -> tuple[str, str]:
     sentence = ", ".join(said)
     kinds = [flag.kind for flag in found.flags]
     if not kinds:
-        return "good", f"{sentence}; nothing to be careful with was found"
+        careful = "only the peaks ask for care, by the note at the table" if coverage_note(found) else ""
+        return "good", f"{sentence}; {careful or 'nothing to be careful with was found'}"
     grade = "bad" if UNUSABLE & set(kinds) else "look"
     words = ", ".join(dict.fromkeys(kind.replace("_", " ") for kind in kinds))
     return grade, f"{sentence}; be careful with: {words}"

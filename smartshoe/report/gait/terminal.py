@@ -45,7 +45,7 @@ def coverage_note(found: GaitFindings) -> str:
         how = "give --coverage-course with one learned from plates; the midfoot's is of walking"
     return (
         f"* a coverage of {found.coverage:.3g} alone says how much of a stance's load is on the units, not when: peaks"
-        f" are up to {100.0 * (1.0 / found.coverage - 1.0):.2g} % too high, since in push-off the units bear nearly"
+        f" may be up to {100.0 * (1.0 / found.coverage - 1.0):.2g} % too high, since in push-off the units bear nearly"
         f" all of it, and loading rates are off too: {how}"
     )
 
