@@ -34,20 +34,16 @@ def _fault(protocol: Protocol, time_s: np.ndarray, load_n: np.ndarray) -> Pressi
     return too_few_repeats(Pressing("left_toe", protocol, log, log))
 
 
-def _log(
-    protocol: Protocol,
-    seed: int = 1,
-    noise: float = 0.002,
-    tare: float = 0.0,
-    gain: float = 1.0,
-    rate: float = 0.0,
-    lag_s: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """A log at 50 Hz; noise and tare are shares of the peak.
+PLAIN = {"seed": 1, "noise": 0.002, "tare": 0.0, "gain": 1.0, "rate": 0.0, "lag_s": 0.0}
+
+
+def _log(protocol: Protocol, **machine: float) -> tuple[np.ndarray, np.ndarray]:
+    """A log at 50 Hz; ``noise`` and ``tare`` are shares of the peak.
 
     The machine's clock is fast by ``rate``, its load off by ``gain`` and late by a first-order lag of ``lag_s``.
     """
-    rng = np.random.default_rng(seed)
+    seed, noise, tare, gain, rate, lag_s = (PLAIN | machine).values()
+    rng = np.random.default_rng(int(seed))
     time_s = np.arange(rng.uniform(0.0, STEP_S), protocol.duration_s + 3.0 * lag_s, STEP_S)
     forgets = np.exp(-STEP_S / lag_s) if lag_s > 0.0 else 0.0
     pressed_n = lfilter([gain * (1.0 - forgets)], [1.0, -forgets], protocol.load_at(time_s))
