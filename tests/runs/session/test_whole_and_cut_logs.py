@@ -69,7 +69,7 @@ machines = st.fixed_dictionaries(
 def test_a_whole_log_is_never_taken_for_one_cut_short(name: str, machine: dict[str, float], rest: float) -> None:
     """Whether or not the last rest, or a part of it, is in the log."""
     protocol = PROTOCOLS[name]
-    time_s, load_n = _log(protocol, **machine)  # type: ignore[arg-type]
+    time_s, load_n = _log(protocol, **machine)
     corner_s, corner_n = protocol.corners()
     unloaded_s = corner_s[np.nonzero(corner_n)[0][-1] + 1]
     end_s = unloaded_s + rest * (protocol.duration_s - unloaded_s) + 3.0 * machine.get("lag_s", 0.0) + STEP_S
@@ -82,7 +82,7 @@ def test_a_log_cut_anywhere_before_the_last_press_is_over_is_refused(
     name: str, machine: dict[str, float], share: float
 ) -> None:
     protocol = PROTOCOLS[name]
-    time_s, load_n = _log(protocol, **machine)  # type: ignore[arg-type]
+    time_s, load_n = _log(protocol, **machine)
     inside = time_s <= (1.0 + machine["rate"]) * share * _last_pressed_s(protocol)
     found = _fault(protocol, time_s[inside], load_n[inside])
     assert found is not None
