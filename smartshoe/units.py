@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array
 from smartshoe.errors import UnitError
 
+DAY_S = 86400.0
+
 
 @dataclass(frozen=True, slots=True)
 class Unit:

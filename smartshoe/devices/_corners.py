@@ -99,7 +99,7 @@ def follow_corners(machine_s: Array, load: Array, logger_s: Array, signal: Array
     load's noise hold a search wherever it begins.
     """
     aside = 0.5 * SLOPE_OVER_S
-    logs = machine_s, load, logger_s, signal
+    logs = machine_s, load, logger_s, signal, corners(machine_s, load)
     found, second = (_searched_from(*logs, delay_s + way * aside) for way in (-1.0, 1.0))
     if found is None or second is None:
         return None
@@ -132,11 +132,11 @@ def kinds_of(at_corners: Array, sides: Array, machine_s: Array, load: Array) -> 
     return kinds
 
 
-def _sd_of_kinds(normal: Array, moments: Array, kinds: Index) -> Array:
+def _sd_of_kinds(covariance: Array, moments: Array, kinds: Index) -> Array:
     """The sds (2,) of delay and rate by how far kinds of corners disagree; zeros where there is one kind only.
 
-    ``normal`` (2, 2) is the normal matrix, ``moments`` (k, 2) the corners' parts of the gradient where the search
-    ended, ``kinds`` (k,) theirs.
+    ``covariance`` (2, 2) is the inverse of the normal matrix, ``moments`` (k, 2) the corners' parts of the gradient
+    where the search ended, ``kinds`` (k,) theirs.
     """
     from scipy.special import stdtrit
 
@@ -144,27 +144,31 @@ def _sd_of_kinds(normal: Array, moments: Array, kinds: Index) -> Array:
     if count < 2:
         return np.zeros(2)
     of_kinds = np.array([moments[kinds == kind].sum(axis=0) for kind in np.unique(kinds)])
-    size = np.sqrt(np.diag(normal))
-    moved = of_kinds / size @ np.linalg.pinv(normal / np.outer(size, size)) / size
+    moved = of_kinds @ covariance
     few = float(stdtrit(count - 1, 0.975)) / NORMAL_95
     found: Array = few * np.sqrt((moved**2).sum(axis=0) * count / (count - 1))
     return found
 
 
 def _searched_from(
-    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float, far: float = 1.0
+    machine_s: Array,
+    load: Array,
+    logger_s: Array,
+    signal: Array,
+    at_corners: Array,
+    delay_s: float,
+    far: float = 1.0,
 ) -> AtCorners | None:
-    """Where a search from ``delay_s`` ends; None where fewer than two corners can be used.
+    """Where a search from ``delay_s`` ends; None where fewer than two of the load's `corners` (m,) can be used.
 
     ``far`` is the share of the usual time before and after each corner that is looked at.
     """
-    at_corners = corners(machine_s, load)
     gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))
     sides = far * np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
     middle = 0.5 * (logger_s[0] + logger_s[-1])
     slope = slope_of(machine_s, load, 0.05)
     kinds = kinds_of(at_corners, sides, machine_s, load)
-    delay, rate, sd, of_kinds = delay_s, 0.0, np.zeros(2), np.zeros(2)
+    delay, rate = delay_s, 0.0
     for _ in range(ITERATIONS):
         at = logger_s + delay + rate * (logger_s - middle)
         normal, scatter, freedom = np.zeros((2, 2)), 0.0, 0
@@ -198,10 +202,10 @@ def _searched_from(
         size = np.sqrt(np.diag(normal))
         scaled = normal / np.outer(size, size)
         change = np.linalg.lstsq(scaled, np.sum(moments, axis=0) / size, rcond=None)[0] / size
-        sd = np.sqrt(np.diag(np.linalg.pinv(scaled)) * scatter / freedom) / size
+        covariance = np.linalg.pinv(scaled) / np.outer(size, size)
+        sd = np.sqrt(np.diag(covariance) * scatter / freedom)
         delay, rate = delay + float(change[0]), rate + float(change[1])
-        of_kinds = _sd_of_kinds(normal, np.array(moments), np.array(used))
         if np.all(np.abs(change) <= SETTLED * sd):
             break
-    delay_sd_s, rate_sd = np.maximum(sd, of_kinds)
+    delay_sd_s, rate_sd = np.maximum(sd, _sd_of_kinds(covariance, np.array(moments), np.array(used)))
     return AtCorners(delay, float(delay_sd_s), rate, float(rate_sd), float(sd[0]))

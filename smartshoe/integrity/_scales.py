@@ -65,6 +65,12 @@ def turns(second: Array) -> tuple[Mask, Mask]:
     return product < 0.0, product > 0.0
 
 
+def is_turning(values: Array) -> bool:
+    """Whether second differences of ``values`` (n,) change sign more often than they keep it, as of noise."""
+    turned, stayed = turns(np.diff(values, 2))
+    return bool(turned.sum() > stayed.sum())
+
+
 def slope_change(values: Array, noise: Array, near: int, largest: float) -> Array:
     """(n,) the largest change of slope within ``near`` samples, per sample, less ``largest`` times the ``noise`` (n,).
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.integrity._quantisation import coarse_step
-from smartshoe.integrity._scales import turns
+from smartshoe.integrity._scales import is_turning
 from smartshoe.integrity._twins import Twin
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
@@ -34,6 +35,11 @@ class _Signals:
     @property
     def duration_s(self) -> float:
         return float(self.time_s[-1])
+
+    @cached_property
+    def noise_sd(self) -> float:
+        """Standard deviation of the reading's white noise."""
+        return white_noise_sd(self.reading)
 
 
 def twins_by_noise(recordings: Sequence[Recording], thresholds: Thresholds) -> dict[int, Twin]:
@@ -62,10 +68,9 @@ def twins_by_noise(recordings: Sequence[Recording], thresholds: Thresholds) -> d
 def _signals_of(recording: Recording) -> _Signals:
     """The recording's load and reading."""
     sensor = recording.sensor
-    reading = sensor.unit.to_si(sensor.with_nan())
-    there = np.isfinite(reading) & np.isfinite(recording.force_n)
+    there = sensor.present & recording.load.present
     time_s = recording.time_s[there]
-    return _Signals(time_s - time_s[:1], recording.force_n[there], reading[there], sensor.unit.quantity)
+    return _Signals(time_s - time_s[:1], recording.force_n[there], sensor.si[there], sensor.unit.quantity)
 
 
 def _is_copy(one: _Signals, other: _Signals, thresholds: Thresholds) -> bool:
@@ -84,12 +89,11 @@ def _is_copy(one: _Signals, other: _Signals, thresholds: Thresholds) -> bool:
     )
     return (
         off_n < thresholds.same * float(np.ptp(coarse.load_n))
-        and thresholds.clear * off < min(white_noise_sd(fine.reading), white_noise_sd(coarse.reading))
+        and thresholds.clear * off < min(fine.noise_sd, coarse.noise_sd)
         and all(_is_noisy(each.reading, thresholds) for each in (fine, coarse))
     )
 
 
 def _is_noisy(reading: Array, thresholds: Thresholds) -> bool:
     """Whether second differences of a ``reading`` (n,) are those of noise, neither of its shape nor of its grid."""
-    turned, stayed = turns(np.diff(reading, 2))
-    return bool(turned.sum() > stayed.sum()) and coarse_step(reading, thresholds) == 0.0
+    return is_turning(reading) and coarse_step(reading, thresholds) == 0.0

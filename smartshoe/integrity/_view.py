@@ -16,9 +16,9 @@ from smartshoe.integrity._scales import (
     SECOND_DIFFERENCE,
     five_point_median,
     grid_step,
+    is_turning,
     local_scale,
     slope_change,
-    turns,
     white_noise,
 )
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -93,9 +93,8 @@ class Signal:
     @cached_property
     def is_noisy(self) -> bool:
         """Whether second differences change sign more often than not, as of noise, by more than one grid step."""
-        turned, stayed = turns(np.diff(self.values, 2))
         least = max(toggling(self.thresholds) * self.step, self.thresholds.material * float(np.ptp(self.values)))
-        return bool(turned.sum() > stayed.sum()) and self.quiet_noise > least
+        return is_turning(self.values) and self.quiet_noise > least
 
     @cached_property
     def outlying(self) -> Array:

@@ -111,7 +111,7 @@ def relays_undone(signal, strength, half_widths, closed, open_, levelling, state
         low, high = y - 2.0 * strength, y + 2.0 * strength
         f, under, over, stays = low, 0.0, 0.0, 0
         for i in range(STEPS):
-            for j in range(state.size):
+            for j in range(state.size):  # a slice that is assigned takes seconds more to compile
                 moved[j] = state[j]
             left = f - y - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, moved)
             if abs(left) <= SOLVED:

@@ -84,7 +84,7 @@ def run_uneven(  # type: ignore[no-untyped-def]
     count, m = out.shape
     size = m + 2
     state = np.zeros(size)
-    for i in range(m):
+    for i in range(m):  # a slice that is assigned takes seconds more to compile
         state[i] = start[i]
     term = np.empty(size)
     after = np.empty(size)

@@ -20,8 +20,7 @@ from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
 from smartshoe.report.wording import sentence
 from smartshoe.signals.noise import NORMAL_95
-
-DAY_S = 86400.0
+from smartshoe.units import DAY_S
 
 
 def _chart(drift: Drift, trend: Trend) -> Chart:

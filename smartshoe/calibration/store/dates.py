@@ -5,8 +5,7 @@ from __future__ import annotations
 from datetime import UTC, date, datetime, time
 
 from smartshoe.errors import UsageError
-
-DAY_S = 86400.0
+from smartshoe.units import DAY_S
 
 
 def moment(given: str | date | datetime, what: str = "the date") -> datetime:

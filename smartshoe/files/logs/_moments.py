@@ -13,23 +13,17 @@ from numpy.typing import NDArray
 from smartshoe.arrays import Array, Index
 from smartshoe.errors import FormatError
 from smartshoe.files.logs._numbers import is_missing
+from smartshoe.units import DAY_S
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d{1,9})?)?\s?(Z|[+-]\d\d:?\d\d)?", re.ASCII)
 _OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d([.,]\d{1,9})?", re.ASCII)
 
-
 LONGEST_BREAK_S = 3600.0  # between two rows around midnight
-DAY_S = 86400.0
 
 
 def is_moment(cell: str) -> bool:
     """Whether a cell is a date with a time, or a time of day."""
     return bool(_DATE.fullmatch(cell) or _OF_DAY.fullmatch(cell))
-
-
-def is_of_day(cell: str) -> bool:
-    """Whether a cell is a time of day without a date."""
-    return bool(_OF_DAY.fullmatch(cell))
 
 
 def midnights(of_day_s: Array) -> Index:
@@ -44,10 +38,11 @@ def midnights(of_day_s: Array) -> Index:
     return rows[1:][step < -far] if not (step > far).any() else rows[:0]
 
 
-def seconds_of(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array:
+def seconds_of(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> tuple[Array, Index]:
     """Seconds (n,) since the first cell, to a nanosecond; NaN where a cell is empty.
 
-    Raises `FormatError` with the line of a cell that is not a moment of the same kind as the first one.
+    Also the rows (m,) from which times of day are the next day's, as they are counted. Raises `FormatError` with the
+    line of a cell that is not a moment of the same kind as the first one.
     """
     import pandas as pd
 
@@ -68,4 +63,8 @@ def seconds_of(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]
     except ValueError as error:
         raise FormatError(f"{path}: column {name} holds no such time ({error}): correct it") from error
     since = np.asarray(ticks).astype(np.int64)  # nanoseconds; missing ones become the smallest integer
-    return np.where(np.isnat(ticks), np.nan, (since - since[0]) / 1e9)
+    seconds = np.where(np.isnat(ticks), np.nan, (since - since[0]) / 1e9)
+    next_days = midnights(seconds if kind is _OF_DAY else seconds[:0])
+    for row in next_days:
+        seconds[row:] += DAY_S
+    return seconds, next_days

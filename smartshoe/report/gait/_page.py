@@ -9,7 +9,7 @@ from typing import Any
 from smartshoe.gait import GaitResult
 from smartshoe.report.document import write_document
 from smartshoe.report.gait import charts, shapes
-from smartshoe.report.gait.terminal import by_foot, coverage_note, weight_mark
+from smartshoe.report.gait.terminal import by_foot, coverage_note, depends_on_course, weight_mark
 from smartshoe.report.numbers import plain, with_sd
 
 UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # flags: all numbers are meaningless
@@ -55,7 +55,7 @@ def verdict(found: GaitResult) -> tuple[str, str]:
     sentence = ", ".join(said)
     kinds = [flag.kind for flag in found.flags]
     if not kinds:
-        careful = "only the peaks ask for care, by the note at the table" if coverage_note(found) else ""
+        careful = "only the peaks ask for care, by the note at the table" if depends_on_course(found) else ""
         return "good", f"{sentence}; {careful or 'nothing to be careful with was found'}"
     grade = "bad" if UNUSABLE & set(kinds) else "look"
     words = ", ".join(dict.fromkeys(kind.replace("_", " ") for kind in kinds))

@@ -16,9 +16,14 @@ COVERAGE_NOTE = (
 )
 
 
+def _has_peaks(found: GaitFindings) -> bool:
+    """Whether peaks of forces are told of any foot."""
+    return any(own["mean"] is not None for own in found.figures["peak_n"].values())
+
+
 def depends_on_coverage(found: GaitFindings) -> bool:
     """Whether forces on the feet assume a coverage of 1 because none was given."""
-    return found.coverage == 1.0 and any(own["mean"] is not None for own in found.figures["peak_n"].values())
+    return found.coverage == 1.0 and _has_peaks(found)
 
 
 def depends_on_course(found: GaitFindings) -> bool:
@@ -26,8 +31,7 @@ def depends_on_course(found: GaitFindings) -> bool:
 
     What they are off by is neither the spread of strides nor the estimate's error.
     """
-    knows_when = found.covering.knows_when(running=found.activity == "running")
-    return not knows_when and any(own["mean"] is not None for own in found.figures["peak_n"].values())
+    return _has_peaks(found) and not found.covering.knows_when(running=found.activity == "running")
 
 
 def coverage_note(found: GaitFindings) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
-from smartshoe.files.logs._moments import DAY_S, is_moment, is_of_day, midnights, seconds_of
+from smartshoe.files.logs._moments import is_moment, seconds_of
 from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of_columns, split_unit, without_units
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import bracketed, even_rows, is_text, read_lines, split_cells
@@ -154,12 +154,11 @@ def read(path: Path) -> Sheet:
     for index in range(width):
         column: Sequence[str] = [row[index] for row in rows]
         if is_moment(column[0]) and not is_number(column[0]):
-            seconds = seconds_of(path, names[index], column, numbers)
-            for row in midnights(seconds) if is_of_day(column[0]) else ():
-                seconds[row:] += DAY_S
-                notes.append(
-                    f"Column {names[index]} passes midnight at line {numbers[row]}: what follows is the next day."
-                )
+            seconds, next_days = seconds_of(path, names[index], column, numbers)
+            notes += [
+                f"Column {names[index]} passes midnight at line {numbers[row]}: what follows is the next day."
+                for row in next_days
+            ]
             clocks[index] = Column(names[index], "s", seconds, label=labels[index])
             said.setdefault(f"start of {names[index]}", column[0])
             continue
